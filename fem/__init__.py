@@ -1,0 +1,1 @@
+"""Three-dimensional finite elements with contact, friction and large deflection."""

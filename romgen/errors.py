@@ -1,0 +1,62 @@
+"""Named failures of romgen: each says what, where, which value, and what to do."""
+
+from __future__ import annotations
+
+
+class RomgenError(Exception):
+    """Base of all failures that a user sees as one line, never as a stack trace.
+
+    Parameters
+    ----------
+    what : the failure in one clause.
+    where : file, table, record or stage that it concerns.
+    value : the offending value, shown with ``repr`` unless it is a string.
+    advice : what to do about it.
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, *, where: str = "", value: object = None, advice: str = "") -> None:
+        self.what, self.where, self.value, self.advice = what, where, value, advice
+        parts = [f"{where}: {what}" if where else what]
+        if value is not None:
+            parts.append(f"got {value if isinstance(value, str) else repr(value)}")
+        if advice:
+            parts.append(advice)
+        super().__init__("; ".join(parts))
+
+
+class InputError(RomgenError):
+    """A study, file or argument that cannot be used as given (exit code 2)."""
+
+    exit_code = 2
+
+
+class NumericalError(RomgenError):
+    """A computation that did not reach its tolerance (exit code 3)."""
+
+    exit_code = 3
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: str = "",
+        value: object = None,
+        advice: str = "",
+        history: tuple[float, ...] = (),
+    ) -> None:
+        super().__init__(what, where=where, value=value, advice=advice)
+        self.history = history
+
+
+class AcceptanceError(RomgenError):
+    """A finished result that misses a stated acceptance limit (exit code 4)."""
+
+    exit_code = 4
+
+
+class StoreError(RomgenError):
+    """A result file that is truncated, of another schema, or not writable (exit code 2)."""
+
+    exit_code = 2
