@@ -1,16 +1,12 @@
-"""The tables of study.toml as frozen, strict records."""
+"""Tables from learning to the report: [learn], [forced_response], [fmu], [report]."""
 
 from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-
-class Settings(BaseModel):
-    """Base of all tables: frozen, and an unknown key is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+from romgen.settings.base import PositiveFrequency, PositiveTime, Settings, Time
 
 
 class LearnSettings(Settings):
@@ -21,7 +17,7 @@ class LearnSettings(Settings):
     order: int | Literal["auto"] = "auto"
     geometry_order: int | None = Field(default=None, ge=1, le=9)
     ridge: float = Field(default=1e-8, ge=0.0)
-    start_time: float = Field(default=0.0, ge=0.0)
+    start_time: Time = 0.0
 
 
 class ForcedResponseSettings(Settings):
@@ -31,7 +27,7 @@ class ForcedResponseSettings(Settings):
     levels: tuple[float, ...] = ()
     sensor: str | None = None
     measure: Literal["max", "sqrt2_rms"] = "sqrt2_rms"
-    frequency_range_hz: tuple[float, float] | None = None
+    frequency_range_hz: tuple[PositiveFrequency, PositiveFrequency] | None = None
 
 
 class FmuSettings(Settings):
@@ -39,5 +35,12 @@ class FmuSettings(Settings):
 
     sensors: tuple[str, ...] | None = None
     platforms: tuple[str, ...] = ("host",)
-    step_size: float = Field(default=1e-4, gt=0.0)
+    step_size: PositiveTime = 1e-4
     pythonfmu: bool = True
+
+
+class ReportSettings(Settings):
+    """Table [report]: what is written beside result.h5."""
+
+    title: str | None = None
+    vtu: bool = True

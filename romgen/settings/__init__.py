@@ -1,0 +1,43 @@
+"""The tables of study.toml as frozen, strict records, and the checks before anything is computed."""
+
+from romgen.settings.base import Settings
+from romgen.settings.data import DataSettings
+from romgen.settings.finite_elements import (
+    ArchSettings,
+    BaseAccelerationSettings,
+    BlockSettings,
+    ConstraintSettings,
+    ContactSettings,
+    LoadSettings,
+    MaterialSettings,
+    ModesSettings,
+    PreloadSettings,
+    RingDownSettings,
+    RingDownStart,
+    SensorSettings,
+)
+from romgen.settings.learning import FmuSettings, ForcedResponseSettings, LearnSettings, ReportSettings
+from romgen.settings.study import Study, StudySettings
+
+__all__ = [
+    "ArchSettings",
+    "BaseAccelerationSettings",
+    "BlockSettings",
+    "ConstraintSettings",
+    "ContactSettings",
+    "DataSettings",
+    "FmuSettings",
+    "ForcedResponseSettings",
+    "LearnSettings",
+    "LoadSettings",
+    "MaterialSettings",
+    "ModesSettings",
+    "PreloadSettings",
+    "ReportSettings",
+    "RingDownSettings",
+    "RingDownStart",
+    "SensorSettings",
+    "Settings",
+    "Study",
+    "StudySettings",
+]

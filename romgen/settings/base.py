@@ -1,0 +1,27 @@
+"""Common base of all tables of study.toml, and the quantity types that accept units."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from romgen.settings.quantities import in_unit
+
+
+class Settings(BaseModel):
+    """Base of all tables: frozen, and an unknown key is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+Length = Annotated[float, BeforeValidator(in_unit("m"))]
+PositiveLength = Annotated[float, BeforeValidator(in_unit("m")), Field(gt=0.0)]
+Time = Annotated[float, BeforeValidator(in_unit("s")), Field(ge=0.0)]
+PositiveTime = Annotated[float, BeforeValidator(in_unit("s")), Field(gt=0.0)]
+Force = Annotated[float, BeforeValidator(in_unit("N"))]
+PositiveFrequency = Annotated[float, BeforeValidator(in_unit("Hz")), Field(gt=0.0)]
+Modulus = Annotated[float, BeforeValidator(in_unit("Pa")), Field(gt=0.0)]
+Density = Annotated[float, BeforeValidator(in_unit("kg/m^3")), Field(gt=0.0)]
+Penalty = Annotated[float, BeforeValidator(in_unit("N/m^3")), Field(gt=0.0)]
+Ratio = Annotated[float, BeforeValidator(in_unit("1"))]

@@ -1,0 +1,156 @@
+"""Tables of a study with a finite-element model: bodies, joints, loads, preload, modes, ring-downs."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from romgen.settings.base import (
+    Density,
+    Force,
+    Length,
+    Modulus,
+    Penalty,
+    PositiveLength,
+    PositiveTime,
+    Ratio,
+    Settings,
+)
+
+Direction = Literal["x", "y", "z"]
+
+
+class MaterialSettings(Settings):
+    """Table [materials.<name>]: isotropic, St. Venant-Kirchhoff (SI)."""
+
+    young_modulus: Modulus
+    poisson_ratio: float = Field(gt=-1.0, lt=0.5)
+    density: Density
+
+
+class ArchSettings(Settings):
+    """Shallow arch added to a block: y += rise/2 (1 + cos(2 pi x / span)) for abs(x) < span/2."""
+
+    rise: Length
+    span: PositiveLength
+
+
+class BlockSettings(Settings):
+    """Table [blocks.<name>]: a structured block, one body; breakpoints in m and cells between them."""
+
+    material: str
+    kinematics: Literal["green_lagrange", "linear"] = "green_lagrange"
+    element: Literal["hex20"] = "hex20"
+    x: tuple[Length, ...] = Field(min_length=2)
+    cells_x: tuple[int, ...]
+    y: tuple[Length, ...] = Field(min_length=2)
+    cells_y: tuple[int, ...]
+    z: tuple[Length, ...] = Field(min_length=2)
+    cells_z: tuple[int, ...]
+    arch: ArchSettings | None = None
+
+    @model_validator(mode="after")
+    def _axes_fit(self) -> Self:
+        for axis, points, cells in (
+            ("x", self.x, self.cells_x),
+            ("y", self.y, self.cells_y),
+            ("z", self.z, self.cells_z),
+        ):
+            if len(cells) != len(points) - 1:
+                raise ValueError(f"{axis} has {len(points) - 1} intervals but cells_{axis} has {len(cells)} numbers")
+            if min(cells) < 1:
+                raise ValueError(f"cells_{axis} must be positive")
+            if any(b <= a for a, b in zip(points, points[1:], strict=False)):
+                raise ValueError(f"breakpoints {axis} must increase")
+        return self
+
+    def axis(self, name: Direction) -> tuple[tuple[float, ...], tuple[int, ...]]:
+        """Return the breakpoints (m) and the cells between them along one axis."""
+        axes = {"x": (self.x, self.cells_x), "y": (self.y, self.cells_y), "z": (self.z, self.cells_z)}
+        return axes[name]
+
+
+class ContactSettings(Settings):
+    """Table [contacts.<name>]: a frictional pair of block faces; penalties default from E and mesh size."""
+
+    slave: str
+    master: str
+    friction: float = Field(ge=0.0)
+    normal_penalty: Penalty | None = None
+    tangential_penalty: Penalty | None = None
+
+
+class ConstraintSettings(Settings):
+    """Table [[constraints]]: displacement components held at zero on a face."""
+
+    surface: str
+    directions: tuple[Direction, ...] = Field(min_length=1)
+
+
+class LoadSettings(Settings):
+    """Table [[loads]]: a uniform dead pressure on a face, given by its resultant along the inward normal."""
+
+    name: str
+    surface: str
+    total_force: Force
+
+
+class PreloadSettings(Settings):
+    """Table [preload]: load-stepped Newton iteration."""
+
+    steps: int = Field(default=4, ge=1)
+    tolerance: float = Field(default=1e-8, gt=0.0, lt=1.0)
+    max_iterations: int = Field(default=30, ge=1)
+
+
+class ModesSettings(Settings):
+    """Table [modes]: modes of the preloaded tangent and the Rayleigh damping through two of them (from 1)."""
+
+    count: int = Field(default=6, ge=1)
+    damping_ratio: tuple[Ratio, Ratio] = (0.004, 0.004)
+    rayleigh_modes: tuple[int, int] = (1, 2)
+
+
+class SensorSettings(Settings):
+    """Table [sensors.<name>]: one displacement component at one material point."""
+
+    point: tuple[Length, Length, Length]
+    direction: Direction
+
+
+class BaseAccelerationSettings(Settings):
+    """Table [base_acceleration]: rigid translation of all constrained faces, f = -M b a(t)."""
+
+    direction: Direction
+
+
+class RingDownStart(Settings):
+    """Table [[ringdowns.training]] or [[ringdowns.validation]]: peak displacement of each master mode, m."""
+
+    name: str
+    amplitudes: tuple[Length, ...] = Field(min_length=1)
+
+
+class RingDownSettings(Settings):
+    """Table [ringdowns]: free decays by generalised-alpha, all marching together."""
+
+    time_step: PositiveTime
+    duration: PositiveTime
+    spectral_radius: float = Field(default=0.9, ge=0.0, le=1.0)
+    tolerance: float = Field(default=1e-4, gt=0.0, lt=1.0)
+    snapshot_stride: int = Field(default=10, ge=1)
+    segment_steps: int = Field(default=250, ge=1)
+    start: Literal["modal", "static"] = "modal"
+    training: tuple[RingDownStart, ...] = Field(min_length=1)
+    validation: tuple[RingDownStart, ...] = ()
+
+    @property
+    def steps(self) -> int:
+        """Number of time steps of each ring-down."""
+        return round(self.duration / self.time_step)
+
+    @property
+    def starts(self) -> tuple[RingDownStart, ...]:
+        """Training starts, then validation starts: the order of the columns of the batch."""
+        return self.training + self.validation

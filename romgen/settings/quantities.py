@@ -1,0 +1,48 @@
+"""Numbers with units: "9.1 kN" -> 9100.0 N."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+UNITS: dict[str, dict[str, float]] = {
+    "1": {"": 1.0, "%": 1e-2},
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "in": 0.0254},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "Hz": {"Hz": 1.0, "kHz": 1e3},
+    "N": {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6},
+    "kg/m^3": {"kg/m^3": 1.0, "kg/m3": 1.0, "g/cm^3": 1e3, "g/cm3": 1e3, "t/mm^3": 1e12, "kg/mm^3": 1e9},
+    "N/m^3": {"N/m^3": 1.0, "N/mm^3": 1e9, "MPa/mm": 1e9, "GPa/m": 1e9},
+}
+"""Accepted units of each SI unit and their factor to it."""
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
+
+
+def parse_quantity(value: object, unit: str) -> object:
+    """Return a text such as "9.1 kN" as a number in the SI ``unit``; other values pass unchanged.
+
+    Raises
+    ------
+    ValueError : the text is not "number unit", or the unit is not one of ``UNITS[unit]``.
+    """
+    if not isinstance(value, str):
+        return value
+    match = _QUANTITY.fullmatch(value)
+    if match is None:
+        raise ValueError(f"not a number with a unit, such as 1.5 or '1.5 {unit}'")
+    number, symbol = match.groups()
+    known = UNITS[unit]
+    if symbol not in known:
+        raise ValueError(f"unknown unit '{symbol}', accepted are {', '.join(u for u in known if u)}")
+    return float(number) * known[symbol]
+
+
+def in_unit(unit: str) -> Callable[[object], object]:
+    """Return the converter to the SI ``unit`` that a settings field runs before its own validation."""
+
+    def convert(value: object) -> object:
+        return parse_quantity(value, unit)
+
+    return convert

@@ -1,0 +1,70 @@
+"""The whole study file as one frozen record."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from romgen.settings.base import Settings
+from romgen.settings.data import DataSettings
+from romgen.settings.finite_elements import (
+    BaseAccelerationSettings,
+    BlockSettings,
+    ConstraintSettings,
+    ContactSettings,
+    LoadSettings,
+    MaterialSettings,
+    ModesSettings,
+    PreloadSettings,
+    RingDownSettings,
+    SensorSettings,
+)
+from romgen.settings.learning import FmuSettings, ForcedResponseSettings, LearnSettings, ReportSettings
+
+
+class StudySettings(Settings):
+    """Table [study]: the name of the run folder and of the FMU."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+
+
+class Study(Settings):
+    """All tables of study.toml: either a finite-element model (blocks, ringdowns) or recorded data."""
+
+    study: StudySettings
+    materials: dict[str, MaterialSettings] = {}
+    blocks: dict[str, BlockSettings] = {}
+    contacts: dict[str, ContactSettings] = {}
+    constraints: tuple[ConstraintSettings, ...] = ()
+    loads: tuple[LoadSettings, ...] = ()
+    preload: PreloadSettings = PreloadSettings()
+    modes: ModesSettings = ModesSettings()
+    sensors: dict[str, SensorSettings] = {}
+    base_acceleration: BaseAccelerationSettings | None = None
+    ringdowns: RingDownSettings | None = None
+    data: DataSettings | None = None
+    learn: LearnSettings = LearnSettings()
+    forced_response: ForcedResponseSettings = ForcedResponseSettings()
+    fmu: FmuSettings = FmuSettings()
+    report: ReportSettings = ReportSettings()
+
+    @model_validator(mode="after")
+    def _model_or_data(self) -> Self:
+        if self.data is not None and (self.blocks or self.ringdowns is not None):
+            raise ValueError("has both [data] and a finite-element model; keep one of them")
+        if self.data is None and not self.blocks:
+            raise ValueError("has neither [data] nor [blocks.<name>]; add one of them")
+        if self.blocks and self.ringdowns is None:
+            raise ValueError("has [blocks] but no [ringdowns]; add the table")
+        return self
+
+    @property
+    def name(self) -> str:
+        """Identifier of the study: letters, digits, underscore."""
+        return self.study.name
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """Names of the sensors, in the order of the columns of every trajectory."""
+        return self.data.sensors if self.data is not None else tuple(self.sensors)
