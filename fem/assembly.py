@@ -1,0 +1,108 @@
+"""Integration data and sparse patterns of a meshed body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fem.arrays import FloatArray, IntArray
+from fem.element import ReferenceElement, reference_element
+from fem.errors import FemInputError
+from fem.kernel import element_forces, element_tangents, gather, scatter_blocks
+from fem.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Shape gradients, weights and gather lists of one group of cells.
+
+    Attributes
+    ----------
+    gradients : (n_cell, n_point, 3, n_local) 1/m; weights : (n_cell, n_point) m^3.
+    nodes : (n_cell, n_local) global node numbers; n_node : global number of nodes.
+    lame : (n_cell, 2) Pa.
+    pointers, entries : cells around each node, see ``kernel.gather``.
+    """
+
+    gradients: FloatArray
+    weights: FloatArray
+    nodes: IntArray
+    n_node: int
+    lame: FloatArray
+    pointers: IntArray
+    entries: IntArray
+
+    def internal_force(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Internal force (n_dof, n_case) in N and strain energy (n_case,) in J at u (n_dof, n_case) in m."""
+        n_cell, n_local = self.nodes.shape
+        forces = np.empty((n_cell, n_local, 3, u.shape[1]))
+        energies = np.empty((n_cell, u.shape[1]))
+        element_forces(self.gradients, self.weights, self.nodes, self.lame, u, forces, energies)
+        out = np.zeros_like(u)
+        gather(self.pointers, self.entries, forces.reshape(-1, 3, u.shape[1]), out)
+        return out, energies.sum(axis=0)
+
+    def element_tangents(self, u: FloatArray) -> FloatArray:
+        """Cell tangents (n_cell, n_local, n_local, 3, 3) in N/m at u (n_dof,) in m."""
+        n_cell, n_local = self.nodes.shape
+        tangents = np.empty((n_cell, n_local, n_local, 3, 3))
+        element_tangents(self.gradients, self.weights, self.nodes, self.lame, u, tangents)
+        return tangents
+
+    def assemble(self, blocks: FloatArray) -> sp.csr_matrix:
+        """Sparse matrix (n_dof, n_dof) from cell blocks (n_cell, n_local, n_local, 3, 3)."""
+        n_local = self.nodes.shape[1]
+        rows = np.repeat(self.nodes, n_local, axis=1).ravel()
+        columns = np.tile(self.nodes, (1, n_local)).ravel()
+        keys, block_map = np.unique(rows * self.n_node + columns, return_inverse=True)
+        data = np.zeros((len(keys), 3, 3))
+        scatter_blocks(block_map.ravel(), np.ascontiguousarray(blocks.reshape(-1, 3, 3)), data)
+        indptr = np.searchsorted(keys // self.n_node, np.arange(self.n_node + 1))
+        shape = (3 * self.n_node, 3 * self.n_node)
+        return sp.bsr_matrix((data, keys % self.n_node, indptr), shape=shape).tocsr()
+
+
+def physical_gradients(
+    reference: ReferenceElement, rule: tuple[FloatArray, FloatArray], points: FloatArray, cells: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gradients (n_cell, n_point, 3, n_local) in 1/m and weights w det J (n_cell, n_point) in m^3.
+
+    A cell with det J <= 0 at an integration point raises ``FemInputError`` that names it.
+    """
+    x, w = rule
+    _, dn = reference.shape(x)
+    jacobian = np.einsum("eai,qaj->eqij", points[cells], dn, optimize=True)
+    det = np.linalg.det(jacobian)
+    if np.any(det <= 0.0):
+        bad = int(np.argmin(det.min(axis=1)))
+        raise FemInputError(
+            "inverted cell: det J <= 0",
+            where=f"cell {bad} at {points[cells[bad]].mean(axis=0)}",
+            value=float(det[bad].min()),
+            advice="check the node order and the shape of this cell",
+        )
+    gradients = np.einsum("qaj,eqji->eqia", dn, np.linalg.inv(jacobian), optimize=True)
+    return np.ascontiguousarray(gradients), det * w
+
+
+def make_cells(mesh: Mesh, offset: int, n_node: int, lame: tuple[float, float]) -> Cells:
+    """Integration data of a body whose nodes start at ``offset`` in a model of ``n_node`` nodes."""
+    reference = reference_element(mesh.element)
+    gradients, weights = physical_gradients(reference, reference.stiffness_rule(), mesh.points, mesh.cells)
+    nodes = np.ascontiguousarray(mesh.cells + offset)
+    order = np.argsort(nodes.ravel(), kind="stable")
+    pointers = np.searchsorted(nodes.ravel()[order], np.arange(n_node + 1))
+    table = np.tile(np.array(lame), (len(nodes), 1))
+    return Cells(gradients, weights, nodes, n_node, table, pointers.astype(np.int64), order.astype(np.int64))
+
+
+def mass_blocks(mesh: Mesh, density: float) -> FloatArray:
+    """Consistent mass of every cell as blocks (n_cell, n_local, n_local, 3, 3) in kg: m_ab = sum_q w rho N_a N_b I."""
+    reference = reference_element(mesh.element)
+    x, w = reference.mass_rule()
+    n, _ = reference.shape(x)
+    _, weights = physical_gradients(reference, (x, w), mesh.points, mesh.cells)
+    scalar = density * np.einsum("eq,qa,qb->eab", weights, n, n, optimize=True)
+    return scalar[..., None, None] * np.eye(3)

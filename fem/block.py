@@ -1,0 +1,91 @@
+"""Structured blocks of quadratic hexahedra."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fem.arrays import FloatArray, IntArray
+from fem.element import reference_element
+from fem.errors import FemInputError
+from fem.mesh import Mesh
+
+_SIDES = (("x_min", 0, 0.0), ("x_max", 0, 1.0), ("y_min", 1, 0.0), ("y_max", 1, 1.0), ("z_min", 2, 0.0), ("z_max", 2, 1.0))
+
+
+def graded(breakpoints: Sequence[float], cells: Sequence[int]) -> FloatArray:
+    """Grid lines with ``cells[i]`` equal intervals between ``breakpoints[i]`` and ``[i + 1]``, in m."""
+    if len(cells) != len(breakpoints) - 1 or len(cells) == 0:
+        raise FemInputError(
+            "one cell count per interval is needed",
+            where="block",
+            value=f"{len(breakpoints)} breakpoints and {len(cells)} counts",
+        )
+    if min(cells) < 1:
+        raise FemInputError("cell counts must be at least 1", where="block", value=list(cells))
+    if np.any(np.diff(breakpoints) <= 0.0):
+        raise FemInputError("breakpoints must increase", where="block", value=list(breakpoints))
+    parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(breakpoints, breakpoints[1:], cells, strict=False)]
+    return np.concatenate([*parts, [breakpoints[-1]]])
+
+
+def hex_block(
+    x: FloatArray,
+    y: FloatArray,
+    z: FloatArray,
+    *,
+    element: str = "hex20",
+    mapping: Callable[[FloatArray], FloatArray] | None = None,
+) -> Mesh:
+    """A block of quadratic hexahedra over the grid lines x, y, z.
+
+    Parameters
+    ----------
+    x, y, z : (n + 1,) increasing grid lines, m.
+    element : "hex20" (serendipity) or "hex27" (triquadratic).
+    mapping : moves the (n_node, 3) points after the grid is laid; None keeps the box.
+
+    Returns
+    -------
+    Mesh with the surfaces x_min, x_max, y_min, y_max, z_min, z_max.
+    """
+    if element not in {"hex20", "hex27"}:
+        raise FemInputError("blocks consist of hex20 or hex27", where="block", value=element)
+    lines = [_with_midpoints(v) for v in (x, y, z)]
+    counts = [len(v) - 1 for v in (x, y, z)]
+    offsets = np.rint(2 * reference_element(element).nodes).astype(np.int64)
+    cell = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    lattice = 2 * cell + offsets[None, :, :]
+    shape = tuple(len(v) for v in lines)
+    flat = np.ravel_multi_index(tuple(np.moveaxis(lattice, -1, 0)), shape)
+    used, cells = np.unique(flat, return_inverse=True)
+    ijk = np.unravel_index(used, shape)
+    points = np.stack([line[i] for line, i in zip(lines, ijk, strict=True)], axis=1)
+    cells = cells.reshape(flat.shape).astype(np.int64)
+    surfaces = {name: _side(cells, cell[:, 0, :], counts, element, axis, end) for name, axis, end in _SIDES}
+    moved = points if mapping is None else mapping(points)
+    return Mesh(np.ascontiguousarray(moved), cells, element, surfaces)
+
+
+def arch(points: FloatArray, rise: float, span: float) -> FloatArray:
+    """Raise a flat panel to a shallow arch: y += rise/2 (1 + cos(2 pi x / span)) for |x| < span/2.
+
+    The slope is zero at mid-span and at the clamps; points (n_node, 3) and lengths in m.
+    """
+    x = points[:, 0]
+    lift = np.where(np.abs(x) < 0.5 * span, 0.5 * rise * (1.0 + np.cos(2.0 * np.pi * x / span)), 0.0)
+    return points + np.outer(lift, [0.0, 1.0, 0.0])
+
+
+def _with_midpoints(v: FloatArray) -> FloatArray:
+    line = np.empty(2 * len(v) - 1)
+    line[::2], line[1::2] = v, 0.5 * (v[1:] + v[:-1])
+    return line
+
+
+def _side(cells: IntArray, index: IntArray, counts: list[int], element: str, axis: int, end: float) -> IntArray:
+    reference = reference_element(element)
+    on_side = [f for f in reference.faces if np.all(reference.nodes[f, axis] == end)]
+    at_end = index[:, axis] == (counts[axis] - 1 if end else 0)
+    return cells[at_end][:, on_side[0]]

@@ -1,0 +1,178 @@
+"""Compiled Total Lagrangian kernels: internal force, tangent and mass for any solid element.
+
+Shape gradients with respect to the undeformed coordinates and integration weights come in as arrays, so that one kernel
+serves all element types. St. Venant-Kirchhoff: S = lambda tr(E) I + 2 mu E, E = (F'F - I)/2, P = F S.
+Several load cases (trajectories) march together: fields are (n_dof, n_case), degree of freedom 3 node + component.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from fem.arrays import FloatArray, IntArray
+
+# The sums over nodes may be reordered (SIMD); nan and inf keep their meaning so that blow-ups are seen.
+_SIMD = {"contract", "reassoc", "nsz", "arcp"}
+
+
+@njit(cache=True, parallel=True, fastmath=_SIMD)
+def element_forces(
+    gradients: FloatArray,
+    weights: FloatArray,
+    cells: IntArray,
+    lame: FloatArray,
+    u: FloatArray,
+    forces: FloatArray,
+    energies: FloatArray,
+) -> None:
+    """f_a = sum_q w P grad N_a and the strain energy sum_q w S:E/2 of every cell and case.
+
+    Parameters
+    ----------
+    gradients : (n_cell, n_point, 3, n_local) 1/m.
+    weights : (n_cell, n_point) m^3.
+    cells : (n_cell, n_local).
+    lame : (n_cell, 2) lambda and mu, Pa.
+    u : (n_dof, n_case) m.
+    forces : (n_cell, n_local, 3, n_case) N, overwritten.
+    energies : (n_cell, n_case) J, overwritten.
+
+    Source: Bonet & Wood, Nonlinear Continuum Mechanics for FE Analysis, 2nd ed., eqs. (6.23), (9.12).
+    """
+    n_cell, n_point, _, n_local = gradients.shape
+    n_case = u.shape[1]
+    for e in prange(n_cell):
+        ue = np.empty((3, n_local))
+        fe = np.empty((3, n_local))
+        F = np.empty((3, 3))
+        S = np.empty((3, 3))
+        P = np.empty((3, 3))
+        lam, mu = lame[e, 0], lame[e, 1]
+        for c in range(n_case):
+            for a in range(n_local):
+                for i in range(3):
+                    ue[i, a] = u[3 * cells[e, a] + i, c]
+                    fe[i, a] = 0.0
+            energy = 0.0
+            for q in range(n_point):
+                for i in range(3):
+                    for j in range(3):
+                        s = 0.0
+                        for a in range(n_local):
+                            s += ue[i, a] * gradients[e, q, j, a]
+                        F[i, j] = s
+                # E from grad u, not from F'F - I: no cancellation at small strain.
+                energy += weights[e, q] * _stress(F, lam, mu, S)
+                for i in range(3):
+                    for j in range(3):
+                        P[i, j] = (F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]) * weights[e, q]
+                for i in range(3):
+                    for a in range(n_local):
+                        fe[i, a] += (
+                            P[i, 0] * gradients[e, q, 0, a]
+                            + P[i, 1] * gradients[e, q, 1, a]
+                            + P[i, 2] * gradients[e, q, 2, a]
+                        )
+            energies[e, c] = energy
+            for a in range(n_local):
+                for i in range(3):
+                    forces[e, a, i, c] = fe[i, a]
+
+
+@njit(cache=True, inline="always", fastmath=_SIMD)
+def _stress(F: FloatArray, lam: float, mu: float, S: FloatArray) -> float:
+    """From grad u in F: F <- I + grad u, S <- lambda tr(E) I + 2 mu E; returns S:E/2."""
+    trace = 0.0
+    for i in range(3):
+        for j in range(3):
+            s = F[i, j] + F[j, i] + F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
+            S[i, j] = 0.5 * s
+        trace += S[i, i]
+    energy = 0.5 * lam * trace * trace
+    for i in range(3):
+        for j in range(3):
+            energy += mu * S[i, j] * S[i, j]
+            S[i, j] *= 2.0 * mu
+        S[i, i] += lam * trace
+        F[i, i] += 1.0
+    return energy
+
+
+@njit(cache=True, parallel=True)
+def gather(pointers: IntArray, entries: IntArray, forces: FloatArray, out: FloatArray) -> None:
+    """Add cell forces to nodes in a fixed order, so that the sum does not depend on the thread count.
+
+    pointers (n_node + 1,), entries (n_cell n_local,) flat (cell, local) numbers, forces (n_cell n_local, 3, n_case),
+    out (n_dof, n_case), accumulated.
+    """
+    n_case = out.shape[1]
+    for node in prange(len(pointers) - 1):
+        for k in range(pointers[node], pointers[node + 1]):
+            for i in range(3):
+                for c in range(n_case):
+                    out[3 * node + i, c] += forces[entries[k], i, c]
+
+
+@njit(cache=True, parallel=True, fastmath=_SIMD)
+def element_tangents(
+    gradients: FloatArray,
+    weights: FloatArray,
+    cells: IntArray,
+    lame: FloatArray,
+    u: FloatArray,
+    tangents: FloatArray,
+) -> None:
+    """K_ab = sum_q w [(g_a.S g_b) I + lambda Fg_a (Fg_b)' + mu Fg_b (Fg_a)' + mu (g_a.g_b) F F'], g_a = grad N_a.
+
+    u (n_dof,) m; tangents (n_cell, n_local, n_local, 3, 3) N/m, overwritten; the rest as in ``element_forces``.
+
+    Source: linearisation of Bonet & Wood (9.12) for the SVK elasticity tensor.
+    """
+    n_cell, n_point, _, n_local = gradients.shape
+    for e in prange(n_cell):
+        F = np.empty((3, 3))
+        S = np.empty((3, 3))
+        B = np.empty((3, 3))
+        Fg = np.empty((n_local, 3))
+        Sg = np.empty((n_local, 3))
+        lam, mu = lame[e, 0], lame[e, 1]
+        tangents[e] = 0.0
+        for q in range(n_point):
+            w = weights[e, q]
+            for i in range(3):
+                for j in range(3):
+                    s = 0.0
+                    for a in range(n_local):
+                        s += u[3 * cells[e, a] + i] * gradients[e, q, j, a]
+                    F[i, j] = s
+            _stress(F, lam, mu, S)
+            for i in range(3):
+                for j in range(3):
+                    B[i, j] = F[i, 0] * F[j, 0] + F[i, 1] * F[j, 1] + F[i, 2] * F[j, 2]
+                for a in range(n_local):
+                    g0, g1, g2 = gradients[e, q, 0, a], gradients[e, q, 1, a], gradients[e, q, 2, a]
+                    Fg[a, i] = F[i, 0] * g0 + F[i, 1] * g1 + F[i, 2] * g2
+                    Sg[a, i] = S[i, 0] * g0 + S[i, 1] * g1 + S[i, 2] * g2
+            for a in range(n_local):
+                for b in range(n_local):
+                    geometric = 0.0
+                    product = 0.0
+                    for i in range(3):
+                        geometric += gradients[e, q, i, b] * Sg[a, i]
+                        product += gradients[e, q, i, a] * gradients[e, q, i, b]
+                    for i in range(3):
+                        tangents[e, a, b, i, i] += w * geometric
+                        for j in range(3):
+                            tangents[e, a, b, i, j] += w * (
+                                lam * Fg[a, i] * Fg[b, j] + mu * Fg[b, i] * Fg[a, j] + mu * product * B[i, j]
+                            )
+
+
+@njit(cache=True)
+def scatter_blocks(block_map: IntArray, blocks: FloatArray, out: FloatArray) -> None:
+    """Add cell blocks (n_block, 3, 3) to the block-sparse data (n_nonzero_block, 3, 3) at ``block_map``."""
+    for k in range(len(block_map)):
+        for i in range(3):
+            for j in range(3):
+                out[block_map[k], i, j] += blocks[k, i, j]
