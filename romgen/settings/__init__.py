@@ -1,7 +1,9 @@
 """The tables of study.toml as frozen, strict records, and the checks before anything is computed."""
 
 from romgen.settings.base import Settings
+from romgen.settings.checks import study_warnings, surfaces
 from romgen.settings.data import DataSettings
+from romgen.settings.estimate import Estimate, estimate
 from romgen.settings.finite_elements import (
     ArchSettings,
     BaseAccelerationSettings,
@@ -17,6 +19,7 @@ from romgen.settings.finite_elements import (
     SensorSettings,
 )
 from romgen.settings.learning import FmuSettings, ForcedResponseSettings, LearnSettings, ReportSettings
+from romgen.settings.load import StudyError, load_study
 from romgen.settings.study import Study, StudySettings
 
 __all__ = [
@@ -26,6 +29,7 @@ __all__ = [
     "ConstraintSettings",
     "ContactSettings",
     "DataSettings",
+    "Estimate",
     "FmuSettings",
     "ForcedResponseSettings",
     "LearnSettings",
@@ -39,5 +43,10 @@ __all__ = [
     "SensorSettings",
     "Settings",
     "Study",
+    "StudyError",
     "StudySettings",
+    "estimate",
+    "load_study",
+    "study_warnings",
+    "surfaces",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -61,7 +62,7 @@ class BlockSettings(Settings):
                 raise ValueError(f"{axis} has {len(points) - 1} intervals but cells_{axis} has {len(cells)} numbers")
             if min(cells) < 1:
                 raise ValueError(f"cells_{axis} must be positive")
-            if any(b <= a for a, b in zip(points, points[1:], strict=False)):
+            if any(b <= a for a, b in pairwise(points)):
                 raise ValueError(f"breakpoints {axis} must increase")
         return self
 

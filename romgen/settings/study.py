@@ -33,14 +33,14 @@ class Study(Settings):
     """All tables of study.toml: either a finite-element model (blocks, ringdowns) or recorded data."""
 
     study: StudySettings
-    materials: dict[str, MaterialSettings] = {}
-    blocks: dict[str, BlockSettings] = {}
-    contacts: dict[str, ContactSettings] = {}
+    materials: dict[str, MaterialSettings] = Field(default_factory=dict)
+    blocks: dict[str, BlockSettings] = Field(default_factory=dict)
+    contacts: dict[str, ContactSettings] = Field(default_factory=dict)
     constraints: tuple[ConstraintSettings, ...] = ()
     loads: tuple[LoadSettings, ...] = ()
     preload: PreloadSettings = PreloadSettings()
     modes: ModesSettings = ModesSettings()
-    sensors: dict[str, SensorSettings] = {}
+    sensors: dict[str, SensorSettings] = Field(default_factory=dict)
     base_acceleration: BaseAccelerationSettings | None = None
     ringdowns: RingDownSettings | None = None
     data: DataSettings | None = None

@@ -1,0 +1,175 @@
+"""Cross-checks of a study before anything is computed: names, files, overlaps, units."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from itertools import product
+
+import numpy as np
+
+from romgen.settings.data import DataSettings
+from romgen.settings.finite_elements import BlockSettings, RingDownSettings
+from romgen.settings.study import Study
+
+# Plausible solids, foam to tungsten; outside of it the unit system is probably not SI.
+DENSITY_RANGE = (50.0, 25_000.0)
+YOUNG_MODULUS_RANGE = (1e6, 2e12)
+# Two starts closer than 1 degree in amplitude space are the same motion at another level.
+SAME_MIX = np.cos(np.deg2rad(1.0))
+
+
+def study_problems(study: Study) -> tuple[str, ...]:
+    """Return one line per thing that the study names but does not have, or contradicts."""
+    checks = (_data_problems(study.data),) if study.data is not None else _model_checks(study)
+    problems = [problem for check in checks for problem in check]
+    return (*problems, *_learn_problems(study), *_downstream_problems(study))
+
+
+def study_warnings(study: Study) -> tuple[str, ...]:
+    """Return one line per value that is legal but looks like another unit system than SI."""
+    lines = []
+    for name, material in study.materials.items():
+        for key, value, (low, high), unit in (
+            ("density", material.density, DENSITY_RANGE, "kg/m^3"),
+            ("young_modulus", material.young_modulus, YOUNG_MODULUS_RANGE, "Pa"),
+        ):
+            if not low <= value <= high:
+                lines.append(
+                    f"[materials.{name}] {key} = {value:g} {unit} is outside {low:g} to {high:g}; "
+                    "is the study in mm-t-s or mm-kg-ms? write SI numbers or a unit, such as '195 GPa'"
+                )
+    return tuple(lines)
+
+
+def surfaces(study: Study) -> tuple[str, ...]:
+    """Return the names of all block faces, "<block>.<axis>_<min|max>"."""
+    return tuple(f"{block}.{axis}_{end}" for block, axis, end in product(study.blocks, "xyz", ("min", "max")))
+
+
+def _unknown(where: str, kind: str, name: str, known: Iterable[str]) -> str:
+    known = tuple(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    advice = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(known) or 'none'}"
+    return f"{where} unknown {kind} '{name}'; {advice}"
+
+
+def _model_checks(study: Study) -> tuple[Iterator[str], ...]:
+    return (
+        _material_problems(study),
+        _surface_problems(study),
+        _contact_problems(study),
+        _sensor_problems(study),
+        _mode_problems(study),
+        _ringdown_problems(study.ringdowns, len(study.learn.master_modes)),
+    )
+
+
+def _material_problems(study: Study) -> Iterator[str]:
+    for name, block in study.blocks.items():
+        if block.material not in study.materials:
+            yield _unknown(f"[blocks.{name}] material:", "material", block.material, study.materials)
+
+
+def _surface_problems(study: Study) -> Iterator[str]:
+    known = surfaces(study)
+    named = [(f"[contacts.{name}] slave:", pair.slave) for name, pair in study.contacts.items()]
+    named += [(f"[contacts.{name}] master:", pair.master) for name, pair in study.contacts.items()]
+    named += [(f"[constraints[{k}]] surface:", item.surface) for k, item in enumerate(study.constraints)]
+    named += [(f"[loads[{k}]] surface:", item.surface) for k, item in enumerate(study.loads)]
+    for where, surface in named:
+        if surface not in known:
+            yield _unknown(where, "surface", surface, known)
+
+
+def _contact_problems(study: Study) -> Iterator[str]:
+    for name, pair in study.contacts.items():
+        if pair.slave.split(".")[0] == pair.master.split(".")[0]:
+            yield f"[contacts.{name}] slave and master belong to the same block; got '{pair.slave}', '{pair.master}'"
+    names = [load.name for load in study.loads]
+    if len(set(names)) < len(names):
+        yield f"[[loads]] names must differ; got {', '.join(names)}"
+
+
+def _sensor_problems(study: Study) -> Iterator[str]:
+    if not study.sensors:
+        yield "[sensors] is empty; name at least one, such as [sensors.mid]"
+    for name, sensor in study.sensors.items():
+        if not any(_inside(block, sensor.point) for block in study.blocks.values()):
+            yield f"[sensors.{name}] point lies in no block; got {list(sensor.point)} m"
+
+
+def _inside(block: BlockSettings, point: tuple[float, float, float]) -> bool:
+    """Whether a point lies in the bounding box of a block, grown by its arch and 1 % of its size."""
+    rise = 0.0 if block.arch is None else block.arch.rise
+    low = np.array([block.x[0], block.y[0] + min(rise, 0.0), block.z[0]])
+    high = np.array([block.x[-1], block.y[-1] + max(rise, 0.0), block.z[-1]])
+    margin = 0.01 * (high - low)
+    return bool(np.all((low - margin <= point) & (point <= high + margin)))
+
+
+def _mode_problems(study: Study) -> Iterator[str]:
+    count = study.modes.count
+    for where, modes in (
+        ("[modes] rayleigh_modes", study.modes.rayleigh_modes),
+        ("[learn] master_modes", study.learn.master_modes),
+    ):
+        if min(modes) < 1 or max(modes) > count:
+            yield f"{where} are numbered from 1 to count = {count}; got {list(modes)}"
+
+
+def _ringdown_problems(ringdowns: RingDownSettings | None, masters: int) -> Iterator[str]:
+    if ringdowns is None:
+        return
+    names = [start.name for start in ringdowns.starts]
+    if len(set(names)) < len(names):
+        yield f"[ringdowns] names of starts must differ; got {', '.join(names)}"
+    for start in ringdowns.starts:
+        if len(start.amplitudes) != masters:
+            yield f"[ringdowns] start '{start.name}' needs one amplitude per master mode ({masters}); " + (
+                f"got {len(start.amplitudes)}"
+            )
+        elif not np.any(start.amplitudes):
+            yield f"[ringdowns] start '{start.name}' has only zero amplitudes"
+    for held_out, trained in product(ringdowns.validation, ringdowns.training):
+        if _same_mix(held_out.amplitudes, trained.amplitudes):
+            yield f"[ringdowns] validation '{held_out.name}' is a multiple of training '{trained.name}'; change its mix"
+
+
+def _same_mix(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return len(a) == len(b) and len(a) > 1 and lengths > 0 and abs(float(np.dot(a, b))) > SAME_MIX * lengths
+
+
+def _data_problems(data: DataSettings) -> Iterator[str]:
+    for file in data.files:
+        if not file.is_file():
+            yield f"[data] files: no such file; got '{file}'"
+    both = set(data.training) & set(data.validation)
+    if both:
+        yield f"[data] validation overlaps training; got {', '.join(map(str, sorted(both, key=str)))} in both"
+    if len(set(data.sensors)) < len(data.sensors):
+        yield f"[data] sensors must differ; got {', '.join(data.sensors)}"
+
+
+def _learn_problems(study: Study) -> Iterator[str]:
+    learn = study.learn
+    if len(set(learn.master_modes)) < len(learn.master_modes) or not learn.master_modes:
+        yield f"[learn] master_modes must differ and not be empty; got {list(learn.master_modes)}"
+    resonance = learn.internal_resonance
+    if resonance not in ("auto", ()) and len(resonance) != len(learn.master_modes):
+        yield f"[learn] internal_resonance needs one integer per master mode; got {list(resonance)}"
+    if isinstance(learn.order, int) and not 1 <= learn.order <= 9:
+        yield f"[learn] order must be 1 to 9 or 'auto'; got {learn.order}"
+
+
+def _downstream_problems(study: Study) -> Iterator[str]:
+    forced, known = study.forced_response, study.sensor_names
+    if forced.sensor is not None and forced.sensor not in known:
+        yield _unknown("[forced_response] sensor:", "sensor", forced.sensor, known)
+    inputs = ("base_acceleration",) if study.base_acceleration is not None else ()
+    if forced.levels and forced.input not in inputs:
+        yield _unknown("[forced_response] input:", "load input", forced.input, inputs)
+    for sensor in study.fmu.sensors or ():
+        if sensor not in known:
+            yield _unknown("[fmu] sensors:", "sensor", sensor, known)
