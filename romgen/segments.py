@@ -7,9 +7,12 @@ import json
 import logging
 import shutil
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from romgen.store import read_file, replace_atomically, write_file
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Record = TypeVar("Record")
 log = logging.getLogger(__name__)
@@ -35,7 +38,7 @@ class SegmentStore:
     def __len__(self) -> int:
         return len(self._entries)
 
-    def append(self, record: object) -> None:
+    def append(self, record: DataclassInstance) -> None:
         """Write one finished segment and then name it in the index."""
         file = self.path / f"segment_{len(self._entries):05d}.h5"
         write_file(file, record)

@@ -8,12 +8,15 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import h5py
 import numpy as np
 
 from romgen.errors import StoreError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 SCHEMA_VERSION = 1
 Record = TypeVar("Record")
@@ -22,7 +25,7 @@ Record = TypeVar("Record")
 CHECKSUM_BYTES = 4096
 
 
-def write_record(group: h5py.Group, record: object) -> None:
+def write_record(group: h5py.Group, record: DataclassInstance) -> None:
     """Write a frozen dataclass into an empty group.
 
     Fields may be arrays, scalars, strings, None, records, tuples of these, and mappings with text keys. Units and
@@ -39,7 +42,7 @@ def write_record(group: h5py.Group, record: object) -> None:
     """
     group.attrs["record"] = type(record).__name__
     group.attrs["schema_version"] = SCHEMA_VERSION
-    for item in fields(record):  # type: ignore[arg-type]  # fields() has no static type for "any dataclass"
+    for item in fields(record):
         _write(group, item.name, getattr(record, item.name))
         for key in ("unit", "axes"):
             if key in item.metadata:
@@ -78,7 +81,7 @@ def read_record(group: h5py.Group, cls: type[Record]) -> Record:
 def _write(group: h5py.Group, name: str, value: Any) -> None:
     if value is None:
         group[name] = h5py.Empty("f8")
-    elif is_dataclass(value):
+    elif is_dataclass(value) and not isinstance(value, type):
         write_record(group.create_group(name), value)
     elif isinstance(value, Mapping):
         child = group.create_group(name)
@@ -188,7 +191,7 @@ def _flush_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def write_file(path: Path, record: object) -> None:
+def write_file(path: Path, record: DataclassInstance) -> None:
     """Write one record as an HDF5 file of its own, atomically."""
 
     def write(temporary: Path) -> None:
