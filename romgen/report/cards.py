@@ -1,0 +1,63 @@
+"""The headline numbers at the top of the report, each with its limit and verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from romgen.arrays import FloatArray
+from romgen.report.blocks import Card
+from romgen.report.inputs import ReportInputs
+
+
+def _frequencies_hz(inputs: ReportInputs) -> FloatArray:
+    """Linear frequencies of the master modes: the model's where there is one, else the first modes."""
+    if inputs.model is not None:
+        return np.asarray(inputs.model.eigenvalues.imag / (2.0 * np.pi))
+    return np.zeros(0) if inputs.modes is None else inputs.modes.frequency_hz[:2]
+
+
+def frequency_cards(inputs: ReportInputs) -> list[Card]:
+    """f1, f2 and their ratio; they are findings and carry no limit."""
+    frequency_hz = _frequencies_hz(inputs)
+    source = "reduced model, small amplitude" if inputs.model is not None else "preloaded FE model"
+    cards = [Card(f"Frequency {k + 1}", f"{f:.2f}", "Hz", source) for k, f in enumerate(frequency_hz[:2])]
+    if frequency_hz.size > 1:
+        cards.append(Card("Frequency ratio", f"{frequency_hz[1] / frequency_hz[0]:.4f}", "", "mode 2 to mode 1"))
+    return cards
+
+
+def nmte_card(inputs: ReportInputs) -> list[Card]:
+    """The worst validation motion against the limit."""
+    unseen = [pair for pair in inputs.reconstructions if pair.role == "validation"]
+    if not unseen:
+        return []
+    worst, limit = max(unseen, key=lambda pair: pair.nmte_percent), inputs.limits.nmte_percent
+    note = f"limit {limit:g} %, worst of {len(unseen)}: {worst.trajectory.name}"
+    passed = bool(worst.nmte_percent <= limit)
+    return [Card("Validation NMTE", f"{worst.nmte_percent:.2f}", "%", note, passed)]
+
+
+def preload_card(inputs: ReportInputs) -> list[Card]:
+    """Largest difference between contact force and applied force."""
+    known = [] if inputs.preload is None else [i for i in inputs.preload.interfaces if np.isfinite(i.applied_force_n)]
+    known = [interface for interface in known if interface.applied_force_n != 0.0]
+    if not known:
+        return []
+    worst = max(100.0 * abs(i.normal_force_n / i.applied_force_n - 1.0) for i in known)
+    limit = inputs.limits.preload_percent
+    return [Card("Clamping force error", f"{worst:.2g}", "%", f"limit {limit:g} %, worst interface", worst <= limit)]
+
+
+def time_card(inputs: ReportInputs) -> list[Card]:
+    """Wall time of all stages and the largest memory."""
+    if not inputs.stages:
+        return []
+    total = sum(stage.wall_s for stage in inputs.stages)
+    memory = max(stage.peak_memory_bytes for stage in inputs.stages) / 2**20
+    return [Card("Run time", f"{total:.1f}", "s", f"all stages; peak memory {memory:,.0f} MiB")]
+
+
+def cards(inputs: ReportInputs) -> tuple[Card, ...]:
+    """All headline numbers that this study has."""
+    builders = (frequency_cards, nmte_card, preload_card, time_card)
+    return tuple(card for build in builders for card in build(inputs))

@@ -1,0 +1,98 @@
+"""What the report is written from; every absent stage is simply left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from romgen.arrays import FloatArray
+from romgen.reduced_model import ReducedModel
+from romgen.structure import Modes, Preload, RingDown, Structure
+from romgen.trajectory import Trajectory
+
+Role = Literal["training", "validation"]
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """One recorded motion and what the reduced model makes of its initial state.
+
+    Attributes
+    ----------
+    trajectory : the motion of the FE model or of the lab.
+    displacement : (n_time, n_sensor) m, the reduced model at the same times and sensors.
+    nmte_percent : normalised mean trajectory error in the coordinates the study judges by.
+    role : whether the model has seen this motion.
+    """
+
+    trajectory: Trajectory
+    displacement: FloatArray
+    nmte_percent: float
+    role: Role
+
+    @property
+    def main_sensor(self) -> int:
+        """Column with the largest recorded motion."""
+        return int(np.argmax(np.abs(self.trajectory.displacement).max(axis=0)))
+
+
+@dataclass(frozen=True)
+class StageCost:
+    """What one stage took: wall time in s and the largest memory of the process in bytes."""
+
+    name: str
+    wall_s: float
+    peak_memory_bytes: int
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the headline numbers are judged by; the report states them next to the verdict.
+
+    Attributes
+    ----------
+    nmte_percent : largest NMTE of any validation motion.
+    fmu_relative : largest relative difference between FMU and Python model under the same input.
+    preload_percent : largest difference between contact resultant and applied force.
+    """
+
+    nmte_percent: float = 5.0
+    fmu_relative: float = 1e-9
+    preload_percent: float = 0.1
+
+
+@dataclass(frozen=True)
+class ReportInputs:
+    """Everything a report can show; only the name of the study is required.
+
+    Attributes
+    ----------
+    study : name of the study.
+    title : headline; the name of the study where it is empty.
+    structure, preload, modes : the finite-element stages; absent for recorded data.
+    ring_downs : the computed transients with their energies.
+    reconstructions : recorded motions against the reduced model.
+    model : the reduced model.
+    stages : cost of each stage, in running order.
+    warnings : one line per thing a reader must know.
+    provenance : name -> value of versions, hashes, seeds and machine.
+    command : the line that makes this report again.
+    limits : what the headline numbers are judged by.
+    """
+
+    study: str
+    title: str = ""
+    structure: Structure | None = None
+    preload: Preload | None = None
+    modes: Modes | None = None
+    ring_downs: tuple[RingDown, ...] = ()
+    reconstructions: tuple[Reconstruction, ...] = ()
+    model: ReducedModel | None = None
+    stages: tuple[StageCost, ...] = ()
+    warnings: tuple[str, ...] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = "romgen run study.toml"
+    limits: Limits = field(default_factory=Limits)

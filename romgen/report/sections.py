@@ -1,0 +1,125 @@
+"""The sections of the report in reading order; a section without data is None."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from romgen.report.blocks import Block, ListingBlock, Section, TableBlock, TextBlock
+from romgen.report.contact_figures import contact_figure, convergence_figure, resultant_table
+from romgen.report.cost_figures import cost_figure, cost_table
+from romgen.report.inputs import ReportInputs
+from romgen.report.mode_tables import frequency_table, ratio_table
+from romgen.report.ringdown_figures import energy_figure, energy_table, nmte_table, ringdown_figure
+from romgen.report.spectrogram_figures import spectrogram_figure
+from romgen.report.structure_figures import mesh_figure, mode_figure
+
+
+def warnings_section(inputs: ReportInputs) -> Section | None:
+    """What a reader must know before believing the numbers."""
+    if not inputs.warnings:
+        return None
+    rows = tuple((f"{k + 1}", text) for k, text in enumerate(inputs.warnings))
+    return Section(
+        "warnings", "Warnings", (TableBlock("Said by the stages of this run.", ("", "warning"), rows, True),)
+    )
+
+
+def structure_section(inputs: ReportInputs) -> Section | None:
+    """The mesh."""
+    structure = inputs.structure
+    if structure is None:
+        return None
+    low, high = structure.points.min(axis=0), structure.points.max(axis=0)
+    counts = np.bincount(structure.cell_body, minlength=len(structure.bodies))
+    text = (
+        f"{structure.points.shape[0]:,} nodes, {3 * structure.points.shape[0]:,} degrees of freedom, "
+        f"{structure.cells.shape[0]:,} {structure.cell_type} elements in a box of "
+        f"{' × '.join(f'{1e3 * d:.4g}' for d in high - low)} mm."
+    )
+    rows = tuple((name, f"{count:,}") for name, count in zip(structure.bodies, counts, strict=True))
+    table = TableBlock("Bodies of the model.", ("body", "elements"), rows)
+    return Section("structure", "Structure", (TextBlock(text), mesh_figure(structure), table))
+
+
+def preload_section(inputs: ReportInputs) -> Section | None:
+    """Static equilibrium and the state of the joints."""
+    preload = inputs.preload
+    if preload is None:
+        return None
+    maps: tuple[Block, ...] = ()
+    if preload.interfaces:
+        maps = (resultant_table(preload), contact_figure(preload))
+    return Section("preload", "Preload and contact", (*maps, convergence_figure(preload)))
+
+
+def modes_section(inputs: ReportInputs) -> Section | None:
+    """Linear modes about the preloaded state."""
+    modes = inputs.modes
+    if modes is None:
+        return None
+    picture: tuple[Block, ...] = () if inputs.structure is None else (mode_figure(inputs.structure, modes),)
+    return Section("modes", "Modes", (frequency_table(modes), *picture, ratio_table(modes)))
+
+
+def ringdown_section(inputs: ReportInputs) -> Section | None:
+    """Recorded motions against the reduced model."""
+    pairs = inputs.reconstructions
+    if not pairs:
+        return None
+    validation_first = sorted(pairs, key=lambda pair: pair.role, reverse=True)
+    figures = tuple(ringdown_figure(pair) for pair in validation_first)
+    return Section("ringdowns", "Ring-downs: reference against reduced model", (nmte_table(pairs), *figures))
+
+
+def energy_section(inputs: ReportInputs) -> Section | None:
+    """Energy balance of the computed transients."""
+    if not inputs.ring_downs:
+        return None
+    figures = tuple(energy_figure(ring_down) for ring_down in inputs.ring_downs)
+    return Section("energy", "Energy balance", (energy_table(inputs.ring_downs), *figures))
+
+
+def spectrogram_section(inputs: ReportInputs) -> Section | None:
+    """Frequency content of the validation motions (of all motions without any)."""
+    if not inputs.reconstructions or inputs.model is None:
+        return None
+    unseen = tuple(pair for pair in inputs.reconstructions if pair.role == "validation") or inputs.reconstructions
+    frequency_hz = inputs.model.eigenvalues.imag / (2.0 * np.pi)
+    figures = tuple(spectrogram_figure(pair, frequency_hz, inputs.model.internal_resonance) for pair in unseen)
+    return Section("spectrogram", "Spectrogram", figures)
+
+
+def cost_section(inputs: ReportInputs) -> Section | None:
+    """Time and memory."""
+    if not inputs.stages:
+        return None
+    return Section("cost", "Time and memory", (cost_figure(inputs.stages), cost_table(inputs.stages)))
+
+
+def provenance_section(inputs: ReportInputs) -> Section | None:
+    """How to make the numbers again and what they were made with."""
+    rows = tuple(inputs.provenance.items())
+    table: tuple[Block, ...] = (TableBlock("Versions, hashes and machine of this run.", ("what", "value"), rows, True),)
+    command = ListingBlock("The command that makes this report again.", inputs.command)
+    return Section("provenance", "Provenance and reproduction", (command, *(table if rows else ())))
+
+
+BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
+    warnings_section,
+    structure_section,
+    preload_section,
+    modes_section,
+    ringdown_section,
+    spectrogram_section,
+    energy_section,
+    cost_section,
+    provenance_section,
+)
+
+
+def sections(inputs: ReportInputs) -> tuple[Section, ...]:
+    """All sections that have data, in reading order."""
+    built = (build(inputs) for build in BUILDERS)
+    return tuple(section for section in built if section is not None)
