@@ -6,9 +6,10 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from romgen.arrays import FloatArray
 from romgen.report.blocks import FigureBlock, TableBlock
@@ -38,11 +39,13 @@ def _squares(interface: Interface) -> tuple[FloatArray, tuple[int, int]]:
 
 
 def _map(
-    axes: Axes, interface: Interface, values: FloatArray, colour_map: object, limits: tuple[float, float]
-) -> object:
+    axes: Axes, interface: Interface, values: FloatArray, colour_map: Colormap, limits: tuple[float, float]
+) -> PolyCollection:
     """Colour every integration point by its value."""
     squares, plane = _squares(interface)
-    patches = PolyCollection(squares, array=values, cmap=colour_map, clim=limits, edgecolors="face", linewidths=0.2)
+    patches = PolyCollection(
+        list(squares), array=values, cmap=colour_map, clim=limits, edgecolors="face", linewidths=0.2
+    )
     axes.add_collection(patches)
     axes.autoscale_view()
     axes.set_aspect("equal")
@@ -114,6 +117,7 @@ def convergence_figure(preload: Preload) -> FigureBlock:
     iteration = np.arange(1, preload.residuals.size + 1)
     left.semilogy(iteration, preload.residuals, "o-", color=BLUE, markersize=3.5)
     label(left, "Newton iteration, all load steps [1]", "relative residual [1]", "residual")
+    right.xaxis.set_major_locator(MaxNLocator(integer=True))
     step = np.arange(1, preload.load_factors.size + 1)
     right.plot(step, preload.load_factors, "o-", color=VERMILLION, markersize=4)
     right.set_ylim(bottom=0.0)
@@ -123,8 +127,8 @@ def convergence_figure(preload: Preload) -> FigureBlock:
         curve_table("preload_load_factors", ("step", "1", step), ("load factor", "1", preload.load_factors)),
     )
     caption = (
-        "Convergence of the static preload. Every drop ends one load step; near the solution the residual should fall "
-        "quadratically, and a plateau points to contact that chatters between open and closed."
+        "Convergence of the static preload. Each load step starts with a jump; within it the residual "
+        "should fall ever faster, and a plateau points to contact that chatters between open and closed."
     )
     return FigureBlock("preload_convergence", figure, caption, tables)
 
@@ -155,7 +159,7 @@ def _resultant_row(interface: Interface) -> tuple[str, ...]:
         interface.name,
         f"{interface.normal_force_n:,.1f}",
         f"{applied:,.1f}" if np.isfinite(applied) else "not determined",
-        f"{100.0 * (interface.normal_force_n / applied - 1.0):+.4f}" if known else "–",
+        f"{100.0 * (interface.normal_force_n / applied - 1.0):+.4f}" if known else "n/a",
         f"{1e6 * interface.contact_area_m2:,.1f}",
         f"{100.0 * interface.area[closed].sum() / area:.1f}",
         f"{100.0 * interface.area[slip].sum() / area:.1f}",

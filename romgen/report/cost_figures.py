@@ -33,8 +33,9 @@ def cost_figure(stages: tuple[StageCost, ...]) -> FigureBlock:
     )
     slowest = stages[int(np.argmax(wall))]
     caption = (
-        f"Cost of every stage as measured in this run: {wall.sum():.1f} s in all, most of it in “{slowest.name}” "
-        f"({100.0 * slowest.wall_s / max(wall.sum(), 1e-12):.0f} %). Stages taken from an earlier run show what they cost then."
+        f"Cost of every stage as measured: {wall.sum():.1f} s in all, most of it in “{slowest.name}” "
+        f"({100.0 * slowest.wall_s / max(wall.sum(), 1e-12):.0f} %). "
+        "Stages taken from an earlier run show what they cost then."
     )
     return FigureBlock("stage_cost", figure, caption, (table,))
 

@@ -26,7 +26,8 @@ def frequency_table(modes: Modes) -> TableBlock:
         f"load by {name} [√kg per {unit}]" for name, unit in zip(modes.inputs, modes.input_units, strict=True)
     )
     caption = (
-        f"Modes about the preloaded state. Damping is Rayleigh: alpha = {modes.alpha:.6g} 1/s, beta = {modes.beta:.6g} s. "
+        "Modes about the preloaded state. "
+        f"Damping is Rayleigh: alpha = {modes.alpha:.6g} 1/s, beta = {modes.beta:.6g} s. "
         "A modal load near zero means that input does not drive the mode."
     )
     return TableBlock(caption, ("mode", "frequency [Hz]", "damping ratio [%]", *loads), rows)

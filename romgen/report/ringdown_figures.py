@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from romgen.arrays import FloatArray
 from romgen.report.blocks import FigureBlock, TableBlock
 from romgen.report.curve_table import CurveTable, curve_table
 from romgen.report.inputs import Reconstruction
-from romgen.report.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, SHADE, VERMILLION, label, new_figure
+from romgen.report.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, VERMILLION, label, new_figure
 from romgen.structure import RingDown
 
 _ZOOM_CYCLES = 10
@@ -42,7 +41,9 @@ def _draw_error(axes: Axes, pair: Reconstruction) -> None:
 def ringdown_figure(pair: Reconstruction) -> FigureBlock:
     """Full record, error, first cycles and tail of one motion."""
     figure = new_figure(5.6)
-    places = figure.subplot_mosaic([["all", "all"], ["error", "error"], ["first", "tail"]], height_ratios=(1.2, 1, 1.1))
+    places: dict[str, Axes] = figure.subplot_mosaic(
+        [["all", "all"], ["error", "error"], ["first", "tail"]], height_ratios=(1.2, 1, 1.1)
+    )
     k, t = pair.main_sensor, pair.trajectory.t
     sensor = pair.trajectory.sensors[k]
     _draw_both(places["all"], pair, slice(None))
@@ -56,9 +57,9 @@ def ringdown_figure(pair: Reconstruction) -> FigureBlock:
         _draw_both(places[name], pair, rows)
         label(places[name], "time [s]", f"{sensor} [mm]", title)
     caption = (
-        f"{pair.trajectory.name}: displacement of sensor “{sensor}” from the rest state, recorded (solid) and by the reduced "
-        f"model from the same initial state (dashed). NMTE {pair.nmte_percent:.2f} %. The last cycles show phase drift, "
-        "which dominates the error of a good model."
+        f"{pair.trajectory.name}: displacement of sensor “{sensor}” from the rest state, recorded (solid) and "
+        f"by the reduced model from the same initial state (dashed). NMTE {pair.nmte_percent:.2f} %. "
+        "The last cycles show phase drift, which dominates the error of a good model."
     )
     return FigureBlock(f"ringdown_{pair.trajectory.name}", figure, caption, (_ringdown_table(pair),))
 
@@ -88,8 +89,8 @@ def nmte_table(pairs: tuple[Reconstruction, ...]) -> TableBlock:
         for pair in sorted(pairs, key=lambda pair: pair.role)
     )
     caption = (
-        "NMTE = 100 · mean over time of |x − x_ROM| / largest |x|. Validation motions were never seen by the fit; judge the "
-        "model by those rows."
+        "NMTE = 100 · mean over time of |x - x_ROM| / largest |x|. Validation motions were never seen by "
+        "the fit; judge the model by those rows."
     )
     header = ("trajectory", "role", "NMTE [%]", "peak displacement [mm]", "length [s]", "samples")
     return TableBlock(caption, header, rows)
@@ -109,17 +110,22 @@ def energy_figure(ring_down: RingDown) -> FigureBlock:
     )
     _draw_stack(top, t, parts)
     top.plot(t, 1e3 * budget, color=BLACK, linewidth=1.0, linestyle="--", label="initial + external work")
-    top.legend(loc="center right")
+    top.legend(loc="lower center", bbox_to_anchor=(0.62, 1.0), ncols=4)
     label(top, "", "energy [mJ]", f"{name}: where the energy goes")
     percent = 100.0 * ledger.imbalance / np.abs(budget).max()
     bottom.plot(t, percent, color=VERMILLION, linewidth=0.9)
-    label(bottom, "time [s]", "imbalance [%]", "made or lost by the integrator, of the largest budget")
+    label(
+        bottom,
+        "time [s]",
+        "imbalance [%]",
+        "energy made (> 0) or lost (< 0) by the time integration, relative to the budget",
+    )
     columns = ("kinetic", "strain", "contact", "friction", "damping", "external", "imbalance")
     table = curve_table(f"energy_{name}", ("time", "s", t), *((c, "J", getattr(ledger, c)) for c in columns))
     caption = (
-        f"{name}: energy dissipated since the start (friction in the joint, Rayleigh damping) under what is still stored "
-        "(kinetic + strain + contact, relative to rest). The upper edge should lie on the dashed budget; the largest "
-        f"imbalance is {np.abs(percent).max():.2g} %."
+        f"{name}: energy dissipated since the start (friction in the joint, Rayleigh damping) under what is "
+        "still stored (kinetic + strain + contact, relative to rest). The upper edge should lie on the dashed budget; "
+        f"the largest imbalance is {np.abs(percent).max():.2g} %."
     )
     return FigureBlock(f"energy_{name}", figure, caption, (table,), "png")
 

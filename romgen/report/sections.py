@@ -36,7 +36,7 @@ def structure_section(inputs: ReportInputs) -> Section | None:
     text = (
         f"{structure.points.shape[0]:,} nodes, {3 * structure.points.shape[0]:,} degrees of freedom, "
         f"{structure.cells.shape[0]:,} {structure.cell_type} elements in a box of "
-        f"{' × '.join(f'{1e3 * d:.4g}' for d in high - low)} mm."
+        f"{' x '.join(f'{1e3 * d:.4g}' for d in high - low)} mm."
     )
     rows = tuple((name, f"{count:,}") for name, count in zip(structure.bodies, counts, strict=True))
     table = TableBlock("Bodies of the model.", ("body", "elements"), rows)

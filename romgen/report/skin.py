@@ -1,20 +1,18 @@
-"""Pictures of the outer surface in three dimensions: polygons of the skin, colours, deformation."""
+"""Pictures of the outer surface: polygons of the skin, projected, shaded and painted from back to front."""
 
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.colors import LightSource
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from mpl_toolkits.mplot3d.axes3d import Axes3D
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 
 from romgen.arrays import FloatArray, IntArray
 from romgen.structure import Structure
 
-# Corner pairs of the element edges, VTK order.
-_EDGES = {
-    "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hex": ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
-}
+# Corner pairs of the edges of a hexahedron, VTK order.
+_HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_AZIMUTH, _ELEVATION = np.radians(-58.0), np.radians(27.0)
+_LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
 def _edge_keys(first: IntArray, second: IntArray, n_node: int) -> IntArray:
@@ -33,12 +31,11 @@ def skin_faces(structure: Structure) -> IntArray:
     triangles, n_node = structure.skin, structure.points.shape[0]
     if structure.cell_type == "tet10":
         return triangles
-    pairs = np.array(_EDGES["hex"])
+    pairs = np.array(_HEX_EDGES)
     in_cells = _edge_keys(structure.cells[:, pairs[:, 0]], structure.cells[:, pairs[:, 1]], n_node)
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1), n_node)
     diagonal = np.argmin(np.isin(keys, in_cells), axis=1)  # the one edge of each triangle that no cell has
-    rows = np.arange(len(triangles))
-    order = np.argsort(keys[rows, diagonal], kind="stable")
+    order = np.argsort(keys[np.arange(len(triangles)), diagonal], kind="stable")
     first, second = order[0::2], order[1::2]
     apex = triangles[second, (diagonal[second] + 2) % 3]
     a, b, c = (triangles[first, (diagonal[first] + k) % 3] for k in range(3))
@@ -52,31 +49,49 @@ def node_body(structure: Structure) -> IntArray:
     return body
 
 
-def draw_faces(axes: Axes3D, points: FloatArray, faces: IntArray, colours: FloatArray, edge: str = "#00000030") -> None:
-    """Draw shaded polygons of the given (n_face, 3 or 4) RGBA colours with a true aspect ratio and no box."""
-    polygons = points[faces]
+def view_frame() -> FloatArray:
+    """(3, 3) orthonormal rows: right and up in the picture, and towards the viewer."""
+    a, e = _AZIMUTH, _ELEVATION
+    right = [-np.sin(a), np.cos(a), 0.0]
+    up = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
+    towards = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+    return np.array([right, up, towards])
+
+
+def _shading(polygons: FloatArray) -> FloatArray:
+    """(n_face,) brightness; thin sheets are seen from both sides, so the sign of the normal does not count."""
     normals = np.cross(polygons[:, 1] - polygons[:, 0], polygons[:, 2] - polygons[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    light = LightSource(azdeg=225.0, altdeg=55.0).direction
-    # Faces of thin sheets are seen from both sides, so only the angle to the light counts, not its sign.
-    shade = 0.72 + 0.28 * np.abs((normals / np.where(length > 0.0, length, 1.0)) @ light)
-    shaded = np.column_stack([colours[:, :3] * shade[:, None], np.ones(len(faces))])
-    axes.add_collection3d(Poly3DCollection(polygons, facecolors=shaded, edgecolors=edge, linewidths=0.25))
-    low, high = points[np.unique(faces)].min(axis=0), points[np.unique(faces)].max(axis=0)
-    extent = np.maximum(high - low, 1e-3 * (high - low).max())
-    axes.set(xlim=(low[0], low[0] + extent[0]), ylim=(low[1], low[1] + extent[1]), zlim=(low[2], low[2] + extent[2]))
-    axes.set_box_aspect(extent, zoom=1.35)
-    axes.view_init(elev=24.0, azim=-58.0)
+    length = np.linalg.norm(normals, axis=1)
+    shade: FloatArray = 0.68 + 0.32 * np.abs(normals @ _LIGHT) / np.maximum(length, np.finfo(float).tiny)
+    return np.minimum(shade, 1.0)
+
+
+def draw_faces(axes: Axes, points: FloatArray, faces: IntArray, colours: FloatArray) -> None:
+    """Draw the skin in parallel projection, true to scale, far faces first.
+
+    Parameters
+    ----------
+    axes : empty axes; they lose their frame.
+    points : (n_node, 3) m, as drawn (deformed).
+    faces : (n_face, 3 or 4) corner nodes.
+    colours : (n_face, 4) RGBA.
+    """
+    seen = points[faces] @ view_frame().T
+    order = np.argsort(seen[:, :, 2].mean(axis=1))
+    shaded = np.column_stack([colours[:, :3] * _shading(points[faces])[:, None], np.ones(len(faces))])
+    outlines = list(seen[order][:, :, :2])
+    axes.add_collection(PolyCollection(outlines, facecolors=shaded[order], edgecolors="#0000003c", linewidths=0.3))
+    axes.autoscale_view()
+    axes.margins(0.02)
+    axes.set_aspect("equal")
     axes.set_axis_off()
 
 
-def draw_triad(axes: Axes3D, points: FloatArray) -> None:
-    """Arrows x, y, z at the lower corner of the picture, one tenth of the model long."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    length = 0.1 * (high - low).max()
-    origin = np.array([low[0], low[1] - 0.06 * (high - low).max(), low[2]])
+def draw_triad(axes: Axes, length: float) -> None:
+    """Arrows x, y, z of the given length in m at the lower left corner of the picture."""
+    right, up, _ = view_frame()
+    x, y = axes.get_xlim()[0] + 0.3 * length, axes.get_ylim()[0] + 0.6 * length
     for k, name in enumerate("xyz"):
-        step = np.zeros(3)
-        step[k] = length
-        axes.quiver(*origin, *step, color="#30343B", linewidth=1.0, arrow_length_ratio=0.25)
-        axes.text(*(origin + 1.25 * step), name, color="#30343B", fontsize=8, ha="center", va="center")
+        dx, dy = length * right[k], length * up[k]
+        axes.annotate("", (x + dx, y + dy), (x, y), arrowprops={"arrowstyle": "->", "color": "#30343B"})
+        axes.text(x + 1.25 * dx, y + 1.25 * dy, name, color="#30343B", fontsize=9, ha="center", va="center")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from romgen.arrays import FloatArray
@@ -25,7 +26,7 @@ def _spectra(pair: Reconstruction, low_hz: float, top_hz: float) -> tuple[Spectr
     return recorded, spectrogram(t, pair.displacement[:, k], window_s, top_hz)
 
 
-def _draw(axes: Axes, spectra: Spectrogram, peak: float, lines: FloatArray) -> object:
+def _draw(axes: Axes, spectra: Spectrogram, peak: float, lines: FloatArray) -> QuadMesh:
     """Level in dB below the peak, with the ridge of the first mode and its multiples."""
     level = 20.0 * np.log10(np.maximum(spectra.amplitude / peak, 1e-12))
     mesh = axes.pcolormesh(
@@ -74,7 +75,8 @@ def spectrogram_figure(pair: Reconstruction, frequency_hz: FloatArray, resonance
     both = _spectra(pair, low, top)
     figure = new_figure(3.3)
     grid = figure.subplots(1, 2, sharey=True)
-    name, peak, tables, mesh = pair.trajectory.name, float(both[0].amplitude.max()), [], None
+    name, peak = pair.trajectory.name, float(both[0].amplitude.max())
+    tables: list[CurveTable] = []
     for axes, spectra, source in zip(grid, both, ("reference", "reduced_model"), strict=True):
         lines = _ridge_lines(spectra, low, multiples)
         mesh = _draw(axes, spectra, peak, lines)
@@ -99,8 +101,8 @@ def _caption(pair: Reconstruction, multiples: tuple[int, ...], window_s: float) 
     if len(multiples) > 1:
         lines += f" and {' and '.join(f'{r}/{multiples[0]}' for r in multiples[1:])} times it (dashed)"
     return (
-        f"{pair.trajectory.name}, sensor “{pair.trajectory.sensors[pair.main_sensor]}”: spectrogram of the record and of the "
-        f"reduced model with the same colour scale (Hann window of {1e3 * window_s:.0f} ms). White: {lines}. A second ridge "
-        "that follows the dashed line while both frequencies drift is an internal resonance; where it leaves the line for "
-        "its linear frequency f₂ the modes have let go of each other."
+        f"{pair.trajectory.name}, sensor “{pair.trajectory.sensors[pair.main_sensor]}”: spectrogram of the record "
+        f"and of the reduced model with the same colour scale (Hann window of {1e3 * window_s:.0f} ms). "
+        f"White: {lines}. A second ridge on the dashed line, while both frequencies drift, is motion locked by the "
+        "internal resonance; away from it, near its linear frequency, the second mode moves on its own."
     )

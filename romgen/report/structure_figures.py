@@ -8,44 +8,49 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, to_rgba
 from matplotlib.patches import Patch
 
-from romgen.arrays import FloatArray
+from romgen.arrays import FloatArray, IntArray
 from romgen.report.blocks import FigureBlock
-from romgen.report.curve_table import curve_table
-from romgen.report.skin import draw_faces, draw_triad, node_body, skin_faces
-from romgen.report.style import DIVERGING, new_figure
+from romgen.report.curve_table import CurveTable, curve_table
+from romgen.report.skin import draw_faces, draw_triad, node_body, skin_faces, view_frame
+from romgen.report.style import DIVERGING, FULL_WIDTH_IN, new_figure
 from romgen.structure import Modes, Structure
 
 # Soft tints, one per body, in the order blue, amber, green, pink, grey.
-_BODY_COLOURS = ("#7FB2D9", "#F0C26B", "#7CC6AC", "#DDA9C6", "#B9BEC7")
+_BODY_COLOURS = ("#8DBBE0", "#F3CB7D", "#8BCDB5", "#E2B4CE", "#C3C8D0")
 SHOWN_MODES = 4
 # Largest drawn modal displacement as a fraction of the model's length.
 _DRAWN_AMPLITUDE = 0.12
 
 
+def _picture_height_in(points: FloatArray, width_in: float) -> float:
+    """Height of the projected model when it fills the given width, within bounds that suit a page."""
+    seen = points @ view_frame().T
+    spread = np.ptp(seen[:, :2], axis=0)
+    return float(np.clip(width_in * spread[1] / spread[0], 1.2, 6.0))
+
+
 def mesh_figure(structure: Structure) -> FigureBlock:
     """The mesh, one colour per body."""
-    figure = new_figure(3.6)
-    axes = figure.add_subplot(projection="3d")
     faces = skin_faces(structure)
+    figure = new_figure(_picture_height_in(structure.points, FULL_WIDTH_IN) + 0.4)
+    axes = figure.add_subplot()
     body = node_body(structure)[faces].min(axis=1)
     palette = np.array([to_rgba(_BODY_COLOURS[k % len(_BODY_COLOURS)]) for k in range(len(structure.bodies))])
     draw_faces(axes, structure.points, faces, palette[body])
-    draw_triad(axes, structure.points)
+    draw_triad(axes, 0.1 * np.ptp(structure.points, axis=0).max())
     handles = [Patch(facecolor=tuple(palette[k]), label=name) for k, name in enumerate(structure.bodies)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    skin_nodes = np.unique(faces)
-    p = structure.points[skin_nodes]
-    table = curve_table(
-        "mesh_skin_nodes", ("node", "1", skin_nodes), ("x", "m", p[:, 0]), ("y", "m", p[:, 1]), ("z", "m", p[:, 2])
-    )
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
+    nodes = np.unique(faces)
+    p = structure.points[nodes]
+    columns = [(name, "m", p[:, k]) for k, name in enumerate("xyz")]
     caption = (
-        "Outer surface of the finite-element mesh as modelled, one colour per body, axes to scale. A symmetric half "
-        "model shows one half only."
+        "Outer surface of the finite-element mesh as modelled, one colour per body, true to scale. A half model with a "
+        "symmetry plane shows one half only."
     )
-    return FigureBlock("mesh", figure, caption, (table,), "png")
+    return FigureBlock("mesh", figure, caption, (curve_table("mesh_skin", ("node", "1", nodes), *columns),), "png")
 
 
-def _unit_shape(modes: Modes, k: int) -> FloatArray:
+def unit_shape(modes: Modes, k: int) -> FloatArray:
     """Mode k at the nodes, (n_node, 3), largest displacement 1, its largest component positive."""
     shape: FloatArray = modes.shapes[:, k].reshape(-1, 3)
     largest = shape.ravel()[np.argmax(np.abs(shape))]
@@ -61,28 +66,32 @@ def transverse_direction(modes: Modes) -> int:
 
 def mode_figure(structure: Structure, modes: Modes) -> FigureBlock:
     """The first modes on the deformed skin, coloured by the transverse displacement."""
-    shown = min(SHOWN_MODES, modes.frequency_hz.size)
-    rows = (shown + 1) // 2
-    figure = new_figure(2.5 * rows + 0.6)
-    faces, direction = skin_faces(structure), transverse_direction(modes)
+    shapes = [unit_shape(modes, k) for k in range(min(SHOWN_MODES, modes.frequency_hz.size))]
     size = _DRAWN_AMPLITUDE * np.ptp(structure.points, axis=0).max()
+    deformed = [structure.points + size * shape for shape in shapes]
+    rows, faces, direction = (len(shapes) + 1) // 2, skin_faces(structure), transverse_direction(modes)
+    height = max(_picture_height_in(points, 0.46 * FULL_WIDTH_IN) for points in deformed)
+    figure = new_figure(rows * (height + 0.25))
+    grid = figure.subplots(rows, 2, squeeze=False)
     norm, colour_map = Normalize(-1.0, 1.0), matplotlib.colormaps[DIVERGING]
-    nodes, columns, grid = np.unique(faces), [], []
-    for k in range(shown):
-        axes = figure.add_subplot(rows, 2, k + 1, projection="3d")
-        shape = _unit_shape(modes, k)
-        value = shape[faces, direction].mean(axis=1)
-        draw_faces(axes, structure.points + size * shape, faces, colour_map(norm(value)), edge="#00000018")
-        axes.set_title(f"mode {k + 1}: {modes.frequency_hz[k]:.2f} Hz", y=0.92)
-        columns += [(f"mode {k + 1} {'xyz'[c]}", "1", shape[nodes, c]) for c in range(3)]
-        grid.append(axes)
-    bar = figure.colorbar(ScalarMappable(norm, colour_map), ax=grid, shrink=0.55, aspect=28, location="right")
-    bar.set_label(f"{'xyz'[direction]} displacement / largest displacement [1]")
+    for k, (axes, points, shape) in enumerate(zip(grid.flat, deformed, shapes, strict=False)):
+        draw_faces(axes, points, faces, colour_map(norm(shape[faces, direction].mean(axis=1))))
+        axes.set_title(f"mode {k + 1}: {modes.frequency_hz[k]:.2f} Hz")
+    for axes in grid.flat[len(shapes) :]:
+        axes.set_axis_off()
+    bar = figure.colorbar(ScalarMappable(norm, colour_map), ax=grid, shrink=0.7, aspect=28, location="right")
+    bar.set_label(f"{'xyz'[direction]} displacement / largest [1]")
     caption = (
         f"Mode shapes of the preloaded structure with stuck contact on the deformed skin; colour is the "
         f"{'xyz'[direction]} displacement. Each shape is drawn with its largest displacement at "
         f"{100 * _DRAWN_AMPLITUDE:.0f} % of the model length; the sign of a mode is arbitrary."
     )
-    return FigureBlock(
-        "modes", figure, caption, (curve_table("mode_shapes_skin", ("node", "1", nodes), *columns),), "png"
-    )
+    return FigureBlock("modes", figure, caption, (_mode_table(np.unique(faces), shapes),), "png")
+
+
+def _mode_table(nodes: IntArray, shapes: list[FloatArray]) -> CurveTable:
+    """Drawn displacement of the skin nodes, three components per mode."""
+    columns = [
+        (f"mode {k + 1} {name}", "1", shape[nodes, c]) for k, shape in enumerate(shapes) for c, name in enumerate("xyz")
+    ]
+    return curve_table("mode_shapes_skin", ("node", "1", nodes), *columns)

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
@@ -65,7 +66,7 @@ def _interface(name: str, z: float, force: float) -> Interface:
     x, y = np.meshgrid(np.linspace(-0.0475, -0.0025, 10), np.linspace(0.0025, 0.0975, 20), indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
     area = np.full(x.size, 0.05 * 0.1 / x.size)
-    raw = np.maximum(np.cos(np.pi * (points[:, 0] + 0.025) / 0.06), 0.05) - 0.15
+    raw = np.maximum(np.cos(np.pi * (points[:, 0] + 0.025) / 0.05), 0.0) - 0.15
     pressure = np.maximum(raw, 0.0) * force / np.sum(np.maximum(raw, 0.0) * area)
     status = np.where(pressure == 0.0, 0, np.where(pressure < 0.2 * pressure.max(), 2, 1))
     traction = 0.1 * np.column_stack([pressure, -pressure])
