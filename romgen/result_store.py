@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -85,23 +86,23 @@ class ResultStore:
         replace_atomically(self._pending / f"{stage}.h5", fill)
         self._infos[stage] = info
 
-    def consolidate(self, order: tuple[str, ...]) -> None:
-        """Merge the stage files into result.h5; stages outside of ``order`` are dropped from it."""
+    def consolidate(self, keys: Mapping[str, str]) -> None:
+        """Merge the stage files into result.h5 in the order of ``keys``; a stage with another key is dropped."""
         pending = sorted(self._pending.glob("*.h5"))
-        if pending:
-            replace_atomically(self.path, lambda temporary: self._merge(temporary, order))
-            for file in pending:
-                file.unlink()
-            self._pending.rmdir()
-            self._infos = {stage: info for stage, info in self._infos.items() if stage in order}
+        if not pending:
+            return
+        self._infos = {stage: self._infos[stage] for stage, key in keys.items() if self.has(stage, key)}
+        replace_atomically(self.path, self._merge)
+        for file in pending:
+            file.unlink()
+        self._pending.rmdir()
 
-    def _merge(self, temporary: Path, order: tuple[str, ...]) -> None:
+    def _merge(self, temporary: Path) -> None:
         with h5py.File(temporary, "w") as merged:
             merged.attrs["schema_version"] = SCHEMA_VERSION
-            for stage in order:
-                if stage in self._infos:
-                    with open_for_reading(self._file_of(stage)) as source:
-                        source.copy(stage, merged)
+            for stage in self._infos:
+                with open_for_reading(self._file_of(stage)) as source:
+                    source.copy(stage, merged)
 
     def _file_of(self, stage: str) -> Path:
         pending = self._pending / f"{stage}.h5"

@@ -1,0 +1,162 @@
+"""Every mistake in a study file is one clear line, and all of them are shown at once."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from romgen.errors import InputError
+from romgen.settings import StudyError, load_study
+from romgen.settings.load import known_keys
+from tests.toml_text import toml_text
+
+ROOT = Path(__file__).parents[3]
+
+
+def problems(folder: Path, tables: dict[str, Any]) -> tuple[str, ...]:
+    path = folder / "study.toml"
+    path.write_text(toml_text(tables), encoding="utf-8")
+    with pytest.raises(StudyError) as caught:
+        load_study(path)
+    assert caught.value.exit_code == 2
+    return caught.value.problems
+
+
+def test_valid_study_loads(tmp_path: Path, tables: dict[str, Any]) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(toml_text(tables), encoding="utf-8")
+    study = load_study(path)
+    assert study.name == "small"
+    assert study.ringdowns is not None
+    assert study.ringdowns.steps == 1000
+    assert study.sensor_names == ("tip",)
+
+
+@pytest.mark.parametrize("model", sorted(path.name for path in (ROOT / "models").iterdir() if path.is_dir()))
+def test_shipped_studies_have_no_problem_but_absent_data(model: str) -> None:
+    for path in sorted((ROOT / "models" / model).glob("*.toml")):
+        try:
+            load_study(path)
+        except StudyError as error:
+            assert all("no such file" in problem for problem in error.problems), error.problems
+
+
+def _set(*keys: str | int, to: Any) -> Callable[[dict[str, Any]], None]:
+    def edit(tables: dict[str, Any]) -> None:
+        target: Any = tables
+        for key in keys[:-1]:
+            target = target[key]
+        target[keys[-1]] = to
+
+    return edit
+
+
+def _without(*keys: str) -> Callable[[dict[str, Any]], None]:
+    def edit(tables: dict[str, Any]) -> None:
+        target: Any = tables
+        for key in keys[:-1]:
+            target = target[key]
+        del target[keys[-1]]
+
+    return edit
+
+
+MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
+    (_set("lern", to={}), "unknown key 'lern'; did you mean 'learn'?"),
+    (_set("blocks", "bar", "matrial", to="steel"), "[blocks.bar] unknown key 'matrial'; did you mean 'material'?"),
+    (_set("ringdowns", "training", 0, "amplitude", to=[1.0]), "[ringdowns.training[0]] unknown key 'amplitude'; did"),
+    (_set("blocks", "bar", "arch", to={"rize": 1.0, "span": 1.0}), "[blocks.bar.arch] missing key 'rise'"),
+    (_set("preload", to={"xyzzy": 1}), "known keys are steps, tolerance, max_iterations"),
+    (_without("materials", "steel", "density"), "[materials.steel] missing key 'density'"),
+    (_set("materials", "steel", "poisson_ratio", to=0.5), "poisson_ratio: Input should be less than 0.5; got 0.5"),
+    (_set("materials", "steel", "young_modulus", to="210 GN"), "young_modulus: unknown unit 'GN', accepted are Pa"),
+    (_set("materials", "steel", "density", to=-1.0), "[materials.steel] density: Input should be greater than 0"),
+    (_set("materials", "steel", "density", to=float("inf")), "density: Input should be a finite number"),
+    (_set("study", "name", to="two words"), "[study] name:"),
+    (_set("blocks", "bar", "material", to="stel"), "unknown material 'stel'; did you mean 'steel'?"),
+    (_set("blocks", "bar", "cells_x", to=[2, 2]), "[blocks.bar] x has 1 intervals but cells_x has 2 numbers"),
+    (_set("blocks", "bar", "cells_x", to=[0]), "[blocks.bar] cells_x must be positive"),
+    (_set("blocks", "bar", "x", to=[1.0, 0.0]), "[blocks.bar] breakpoints x must increase"),
+    (_set("blocks", "bar", "element", to="hex8"), "[blocks.bar] element: Input should be 'hex20'"),
+    (_set("contacts", "joint", "slave", to="bar.y_mni"), "unknown surface 'bar.y_mni'; did you mean 'bar.y_min'?"),
+    (_set("contacts", "joint", "master", to="bar.y_max"), "slave and master belong to the same block"),
+    (_set("contacts", "joint", "friction", to=-0.1), "friction: Input should be greater than or equal to 0"),
+    (_set("constraints", 0, "surface", to="floor"), "[constraints[0]] surface: unknown surface 'floor'; known are"),
+    (_set("constraints", 0, "directions", to=["w"]), "Input should be 'x', 'y' or 'z'; got 'w'"),
+    (_set("loads", 0, "surface", to="bar.y_mx"), "[loads[0]] surface: unknown surface 'bar.y_mx'"),
+    (_set("sensors", "tip", "point", to=[1.0, 5.0, 0.1]), "[sensors.tip] point lies in no block"),
+    (_set("sensors", to={}), "[sensors] is empty"),
+    (_set("modes", to={"count": 1}), "[learn] master_modes are numbered from 1 to count = 1"),
+    (_set("ringdowns", "validation", 0, "amplitudes", to=[2e-3, 0.0]), "'b' is a multiple of training 'a'"),
+    (_set("ringdowns", "validation", 0, "name", to="a"), "[ringdowns] names of starts must differ"),
+    (_set("ringdowns", "training", 0, "amplitudes", to=[1e-3]), "start 'a' needs one amplitude per master mode (2)"),
+    (_set("ringdowns", "training", 0, "amplitudes", to=[0.0, 0.0]), "start 'a' has only zero amplitudes"),
+    (_set("ringdowns", "time_step", to=0.0), "[ringdowns] time_step: Input should be greater than 0"),
+    (_set("learn", to={"order": 11}), "[learn] order must be 1 to 9"),
+    (_set("learn", to={"internal_resonance": [1, 2, 3]}), "needs one integer per master mode"),
+    (_set("learn", to={"internal_resonance": "always"}), "[learn] internal_resonance:"),
+    (_set("learn", to={"master_modes": [1, 1]}), "[learn] master_modes must differ"),
+    (_set("forced_response", "sensor", to="tpi"), "unknown sensor 'tpi'; did you mean 'tip'?"),
+    (_set("forced_response", "input", to="shaker"), "unknown load input 'shaker'"),
+    (_set("forced_response", "measure", to="rms"), "Input should be 'max' or 'sqrt2_rms'; got 'rms'"),
+    (_set("fmu", to={"sensors": ["top"]}), "[fmu] sensors: unknown sensor 'top'; did you mean 'tip'?"),
+    (_set("fmu", to={"step_size": "1 h"}), "[fmu] step_size: unknown unit 'h'"),
+    (_set("data", to={"files": ["a.mat"], "sensors": ["a"], "training": [0]}), "both [data] and a finite-element"),
+    (_without("ringdowns"), "has [blocks] but no [ringdowns]"),
+    (_set("blocks", to={}), "has neither [data] nor [blocks.<name>]"),
+]
+
+
+@pytest.mark.parametrize(("edit", "expected"), MISTAKES, ids=[expected[:40] for _, expected in MISTAKES])
+def test_mistake_is_one_line(
+    tmp_path: Path, tables: dict[str, Any], edit: Callable[[dict[str, Any]], None], expected: str
+) -> None:
+    edit(tables)
+    found = problems(tmp_path, tables)
+    assert any(expected in line for line in found), found
+    assert all("\n" not in line and line.startswith("study.toml: ") for line in found)
+    assert not any("pydantic" in line or "Value error" in line for line in found)
+
+
+def test_all_problems_are_listed(tmp_path: Path, tables: dict[str, Any]) -> None:
+    tables["lern"] = {}
+    tables["preload"] = {"step": 1}
+    tables["contacts"]["joint"]["master"] = "bse.y_max"
+    tables["forced_response"]["sensor"] = "tpi"
+    assert len(problems(tmp_path, tables)) == 4
+
+
+def test_missing_data_file_and_overlap(tmp_path: Path) -> None:
+    data = {"files": ["gone.mat"], "sensors": ["a", "a"], "training": [0, 1], "validation": [1]}
+    found = problems(tmp_path, {"study": {"name": "lab"}, "data": data})
+    assert len(found) == 3
+    assert f"no such file; got '{tmp_path / 'gone.mat'}'" in found[0]
+    assert "validation overlaps training; got 1 in both" in found[1]
+
+
+def test_files_are_relative_to_the_study(tmp_path: Path) -> None:
+    (tmp_path / "sub folder ü").mkdir()
+    (tmp_path / "sub folder ü" / "a.mat").write_bytes(b"x")
+    path = tmp_path / "sub folder ü" / "study.toml"
+    path.write_text(
+        toml_text({"study": {"name": "lab"}, "data": {"files": ["a.mat"], "sensors": ["a"], "training": ["one"]}}),
+        encoding="utf-8",
+    )
+    data = load_study(path).data
+    assert data is not None
+    assert data.files == ((tmp_path / "sub folder ü" / "a.mat").resolve(),)
+
+
+def test_not_toml_and_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such study file"):
+        load_study(tmp_path / "study.toml")
+    (tmp_path / "study.toml").write_text("a = = 1", encoding="utf-8")
+    with pytest.raises(InputError, match="not valid TOML"):
+        load_study(tmp_path / "study.toml")
+
+
+def test_known_keys_follow_the_path() -> None:
+    assert known_keys(("blocks", "any", "arch")) == ("rise", "span")
+    assert known_keys(("ringdowns", "training", 0)) == ("name", "amplitudes")
+    assert known_keys(("materials",)) == ()
