@@ -84,9 +84,9 @@ def _write(group: h5py.Group, name: str, value: Any) -> None:
     elif is_dataclass(value) and not isinstance(value, type):
         write_record(group.create_group(name), value)
     elif isinstance(value, Mapping):
-        child = group.create_group(name)
-        for key, entry in value.items():
-            _write(child, str(key), entry)
+        _write(group, name, tuple(value.values()))
+        # Keys are free text ("a/b" would be a path), so they are stored as texts in the order of the entries.
+        group[name].attrs["keys"] = np.array([str(key) for key in value], dtype=h5py.string_dtype())
     elif isinstance(value, tuple | list):
         child = group.create_group(name)
         for k, entry in enumerate(value):
@@ -112,7 +112,8 @@ def _read(item: h5py.Group | h5py.Dataset, hint: Any) -> Any:
     if origin is tuple:
         return _read_tuple(item, get_args(hint))
     if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
-        return {key: _read(item[key], get_args(hint)[1]) for key in item}
+        entries = _read_tuple(item, (get_args(hint)[1], Ellipsis))
+        return dict(zip((str(key) for key in item.attrs["keys"]), entries, strict=True))
     if origin is np.ndarray:
         array = item[()]
         array.flags.writeable = False
