@@ -38,7 +38,7 @@ def load_study(path: Path | str) -> Study:
     StudyError : it has unknown keys, wrong values, or names things that do not exist; lists all of them.
     """
     path = Path(path)
-    study, problems = _validated(_read_toml(path), path)
+    study, problems = _validated(_extended(_read_toml(path), path), path)
     if study is not None:
         problems += [f"{path.name}: {problem}" for problem in study_problems(study)]
     if problems or study is None:
@@ -53,6 +53,27 @@ def _read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"not valid TOML: {error}", where=str(path)) from error
+
+
+def _extended(tables: dict[str, Any], path: Path, seen: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Lay the tables over those of the study that [study] extends names, if it names one."""
+    head = tables.get("study")
+    base = head.get("extends") if isinstance(head, dict) else None
+    if not isinstance(base, str):
+        return tables
+    if path.resolve() in seen:
+        raise InputError("[study] extends goes round in a circle", where=path.name, value=base)
+    below = path.parent / base
+    return _overlay(_extended(_read_toml(below), below, (*seen, path.resolve())), tables)
+
+
+def _overlay(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Merge tables key by key; everything else, arrays too, is replaced."""
+    merged = dict(below)
+    for key, value in above.items():
+        both = isinstance(value, dict) and isinstance(below.get(key), dict)
+        merged[key] = _overlay(below[key], value) if both else value
+    return merged
 
 
 def _validated(tables: dict[str, Any], path: Path) -> tuple[Study | None, list[str]]:

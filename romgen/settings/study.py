@@ -24,9 +24,10 @@ from romgen.settings.learning import FmuSettings, ForcedResponseSettings, LearnS
 
 
 class StudySettings(Settings):
-    """Table [study]: the name of the run folder and of the FMU."""
+    """Table [study]: the name of the run folder and of the FMU; ``extends`` names a study to start from."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    extends: str | None = None
 
 
 class Study(Settings):

@@ -9,7 +9,7 @@ import pytest
 from romgen.errors import InputError
 from romgen.settings import StudyError, load_study
 from romgen.settings.checks import study_problems
-from romgen.settings.load import _read_toml, _validated, known_keys
+from romgen.settings.load import _extended, _read_toml, _validated, known_keys
 from tests.toml_text import toml_text
 
 ROOT = Path(__file__).parents[3]
@@ -39,7 +39,7 @@ SHIPPED = sorted((ROOT / "models").glob("*/*.toml"))
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_shipped_studies_have_no_problem_but_absent_data(path: Path) -> None:
-    study, found = _validated(_read_toml(path), path)
+    study, found = _validated(_extended(_read_toml(path), path), path)
     assert found == []
     assert study is not None
     assert [line for line in study_problems(study) if "no such file" not in line] == []
@@ -157,6 +157,26 @@ def test_not_toml_and_not_there(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text("a = = 1", encoding="utf-8")
     with pytest.raises(InputError, match="not valid TOML"):
         load_study(tmp_path / "study.toml")
+
+
+def test_extended_study_keeps_what_it_does_not_change(tmp_path: Path, tables: dict[str, Any]) -> None:
+    (tmp_path / "base.toml").write_text(toml_text(tables), encoding="utf-8")
+    variant = {"study": {"name": "variant", "extends": "base.toml"}, "ringdowns": {"duration": 0.05}}
+    (tmp_path / "variant.toml").write_text(toml_text(variant), encoding="utf-8")
+    base, changed = load_study(tmp_path / "base.toml"), load_study(tmp_path / "variant.toml")
+    assert changed.ringdowns is not None
+    assert base.ringdowns is not None
+    assert changed.ringdowns.steps == 500
+    assert changed.ringdowns.starts == base.ringdowns.starts
+    assert changed.blocks == base.blocks
+
+
+def test_circle_of_extended_studies(tmp_path: Path) -> None:
+    for name, other in (("a", "b"), ("b", "a")):
+        text = toml_text({"study": {"name": name, "extends": f"{other}.toml"}})
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="goes round in a circle"):
+        load_study(tmp_path / "a.toml")
 
 
 def test_known_keys_follow_the_path() -> None:
