@@ -1,0 +1,140 @@
+/* FMI 2.0 functions for Co-Simulation. */
+#include <math.h>
+#include <string.h>
+
+#include "rom_instance.h"
+
+#define MAX_SUB_STEPS 1e7 /* beyond this a step length or max_internal_step is a mistake, not a wish */
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[])
+{
+    static const char function[] = "fmi2SetRealInputDerivatives";
+    rom_instance *s = c;
+    if (!rom_permits(s, MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP_COMPLETE, function))
+        return fmi2Error;
+    for (size_t k = 0; k < n; ++k) {
+        if (vr == NULL || order == NULL || value == NULL || !rom_in_block(vr[k], VR_INPUT, N_INPUT))
+            return rom_refuse(s, function, "a value reference is no input");
+        if (order[k] != 1 || !isfinite(value[k]))
+            return rom_refuse(s, function, "only finite first derivatives of inputs are taken");
+    }
+    for (size_t k = 0; k < n; ++k)
+        s->memory.input_derivative[vr[k] - VR_INPUT] = value[k];
+    return fmi2OK;
+}
+
+/* u(t) = gain (u_0 + u_0' tau), tau measured from the communication point */
+static void input_at(const rom_memory *memory, double tau, double u[])
+{
+    for (size_t i = 0; i < N_INPUT_STORED; ++i)
+        u[i] = memory->input_gain * (memory->input[i] + memory->input_derivative[i] * tau);
+}
+
+/* n = ceil(H / h_max), forgiving round-off in H, so that the number of sub-steps never depends on accumulated time */
+static double sub_step_count(const rom_memory *memory, double step)
+{
+    const double n = ceil(step / memory->max_internal_step - 1e-9);
+    return n < 1.0 ? 1.0 : n;
+}
+
+/* Integrates over `step` in place on a copy of the state; NULL, or the reason of a failure. */
+static const char *integrate(rom_instance *s, double step, rom_complex z[])
+{
+    const double n = sub_step_count(&s->memory, step), h = step / n;
+    double u_start[N_INPUT_STORED], u_middle[N_INPUT_STORED], u_end[N_INPUT_STORED];
+    if (n > MAX_SUB_STEPS)
+        return "the communication step holds more than 1e7 internal steps";
+    rom_etdrk4_prepare(&s->integrator, h);
+    for (double k = 0.0; k < n; k += 1.0) {
+        input_at(&s->memory, k * h, u_start);
+        input_at(&s->memory, (k + 0.5) * h, u_middle);
+        input_at(&s->memory, (k + 1.0) * h, u_end);
+        rom_etdrk4_step(&s->integrator, u_start, u_middle, u_end, &s->workspace, z);
+        if (!isfinite(rom_trust_ratio(z)))
+            return "the state became infinite or undefined; the state of the last communication point is kept";
+        if (rom_beyond_hard_limit(s, z))
+            return "trust_ratio exceeds hard_limit; the state of the last communication point is kept";
+    }
+    return NULL;
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi2Boolean no_set_state_prior)
+{
+    rom_instance *s = c;
+    rom_complex z[N_MODE];
+    (void)no_set_state_prior; /* nothing is kept for a possible rollback: states are copied on request */
+    if (!rom_permits(s, MODE_STEP_COMPLETE, "fmi2DoStep"))
+        return fmi2Error;
+    if (!isfinite(current_time) || !isfinite(step) || !(step > 0.0))
+        return rom_refuse(s, "fmi2DoStep", "the communication step must be positive and finite");
+    if (s->memory.stop_time_defined != 0.0 && current_time + step > s->memory.stop_time + 1e-6 * step)
+        return rom_refuse(s, "fmi2DoStep", "the step passes the stop time given to fmi2SetupExperiment");
+    memcpy(z, s->memory.z, sizeof z);
+    const char *reason = integrate(s, step, z);
+    if (reason != NULL)
+        return rom_fail(s, "fmi2DoStep", reason);
+    memcpy(s->memory.z, z, sizeof z);
+    for (size_t i = 0; i < N_INPUT_STORED; ++i)
+        s->memory.input[i] += s->memory.input_derivative[i] * step;
+    s->memory.time = current_time + step;
+    rom_invalidate(s);
+    return rom_check_trust(s);
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    return rom_refuse(c, "fmi2CancelStep", "steps are computed synchronously, there is none to cancel");
+}
+
+/* A status that only asynchronous steps have. */
+static fmi2Status no_pending_step(const rom_instance *s, const char *function)
+{
+    if (!rom_permits(s, MODE_STEP_COMPLETE | MODE_TERMINATED | MODE_ERROR, function))
+        return fmi2Error;
+    rom_log(&s->logger, fmi2Discard, LOG_DISCARD, function, "steps are computed synchronously, this status does not exist");
+    return fmi2Discard;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
+{
+    (void)kind;
+    (void)value;
+    return no_pending_step(c, "fmi2GetStatus");
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    const rom_instance *s = c;
+    if (kind != fmi2LastSuccessfulTime || value == NULL)
+        return no_pending_step(s, "fmi2GetRealStatus");
+    if (!rom_permits(s, MODE_STEP_COMPLETE | MODE_TERMINATED | MODE_ERROR, "fmi2GetRealStatus"))
+        return fmi2Error;
+    *value = s->memory.time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
+{
+    (void)kind;
+    (void)value;
+    return no_pending_step(c, "fmi2GetIntegerStatus");
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
+{
+    const rom_instance *s = c;
+    if (kind != fmi2Terminated || value == NULL)
+        return no_pending_step(s, "fmi2GetBooleanStatus");
+    if (!rom_permits(s, MODE_STEP_COMPLETE | MODE_TERMINATED | MODE_ERROR, "fmi2GetBooleanStatus"))
+        return fmi2Error;
+    *value = fmi2False;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+{
+    (void)kind;
+    (void)value;
+    return no_pending_step(c, "fmi2GetStringStatus");
+}

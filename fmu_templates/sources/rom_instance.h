@@ -1,0 +1,108 @@
+/* One instance: its memory (all that a saved state holds), its work arrays and its callbacks. */
+#ifndef ROM_INSTANCE_H
+#define ROM_INSTANCE_H
+
+#include <stdint.h>
+
+#include "fmi2Functions.h"
+#include "rom_etdrk4.h"
+#include "rom_log.h"
+
+#define N_INPUT_STORED ROM_AT_LEAST_ONE(N_INPUT)
+
+/* Modes of the FMI 2.0 state machine, as bits so that each call can name the modes it is allowed in. */
+enum {
+    MODE_INSTANTIATED = 1 << 0,
+    MODE_INITIALIZATION = 1 << 1,
+    MODE_STEP_COMPLETE = 1 << 2,
+    MODE_EVENT = 1 << 3,
+    MODE_CONTINUOUS = 1 << 4,
+    MODE_TERMINATED = 1 << 5,
+    MODE_ERROR = 1 << 6,
+    MODE_READABLE = MODE_INITIALIZATION | MODE_STEP_COMPLETE | MODE_EVENT | MODE_CONTINUOUS | MODE_TERMINATED | MODE_ERROR,
+    MODE_WRITABLE = MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP_COMPLETE | MODE_EVENT | MODE_CONTINUOUS,
+    MODE_ANY = MODE_INSTANTIATED | MODE_READABLE
+};
+
+/* Value references of the Real variables: contiguous blocks in this order. */
+enum {
+    VR_STATE = 0,
+    VR_RATE = VR_STATE + N_REDUCED,
+    VR_INPUT = VR_RATE + N_REDUCED,
+    VR_SENSOR = VR_INPUT + N_INPUT,
+    VR_AMPLITUDE = VR_SENSOR + N_SENSOR_ROW,
+    VR_TRUST_RATIO = VR_AMPLITUDE + N_MODE,
+    VR_INPUT_GAIN,
+    VR_TRUST_RADIUS,
+    VR_HARD_LIMIT,
+    VR_MAX_INTERNAL_STEP,
+    VR_FREQUENCY,
+    VR_DAMPING = VR_FREQUENCY + N_MODE,
+    VR_REAL_END = VR_DAMPING + N_MODE
+};
+
+/* Value references of the Boolean variables. */
+enum { VR_INSIDE_TRUST_REGION, VR_WARN_ON_CROSSING, VR_BOOLEAN_END };
+
+/* Everything a saved state holds, as doubles only; modes and flags are small integers and exact. */
+typedef struct {
+    double kind, mode;
+    double time, stop_time_defined, stop_time;
+    rom_complex z[N_MODE];
+    double input[N_INPUT_STORED], input_derivative[N_INPUT_STORED]; /* at the present time, before the gain */
+    double input_gain, trust_radius, hard_limit, max_internal_step, warn_on_crossing;
+    double inside;
+} rom_memory;
+
+#define N_MEMORY (sizeof(rom_memory) / sizeof(double))
+
+typedef struct rom_snapshot {
+    rom_memory memory;
+    struct rom_snapshot *next;
+} rom_snapshot;
+
+typedef struct {
+    rom_memory memory;
+    rom_etdrk4 integrator;
+    rom_workspace workspace;
+    rom_complex rate[N_MODE];
+    rom_output output;
+    int rate_is_valid, output_is_valid;
+    rom_snapshot *snapshots; /* every live handle given out by fmi2GetFMUstate */
+    rom_logger logger;
+    unsigned initial_categories;
+} rom_instance;
+
+rom_memory rom_initial_memory(fmi2Type kind);
+
+/* True if the instance exists and `function` may be called in its mode; a refusal is logged. */
+int rom_permits(const rom_instance *s, int modes, const char *function);
+
+/* Logs why a call was refused; nothing has been changed. */
+fmi2Status rom_refuse(const rom_instance *s, const char *function, const char *reason);
+
+/* Logs why a computation failed and enters the error mode; the state is the last good one. */
+fmi2Status rom_fail(rom_instance *s, const char *function, const char *reason);
+
+/* Forgets computed values after a change of state, input or parameter. */
+void rom_invalidate(rom_instance *s);
+
+void rom_update_rate(rom_instance *s);
+
+/* Logs a crossing of the trust radius; fmi2Warning on leaving it, if wanted. */
+fmi2Status rom_check_trust(rom_instance *s);
+
+int rom_beyond_hard_limit(const rom_instance *s, const rom_complex z[]);
+
+double rom_get_real(rom_instance *s, fmi2ValueReference vr);
+int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value);
+void rom_set_real(rom_instance *s, fmi2ValueReference vr, double value);
+void rom_free_snapshots(rom_instance *s);
+
+/* True if vr is one of the n references from `first` on; n = 0 is fine. */
+static inline int rom_in_block(fmi2ValueReference vr, fmi2ValueReference first, fmi2ValueReference n)
+{
+    return vr >= first && vr - first < n;
+}
+
+#endif

@@ -1,0 +1,189 @@
+#include "rom_kernel.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "coefficients.h"
+
+static rom_complex multiply(rom_complex a, rom_complex b)
+{
+    rom_complex c = {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+    return c;
+}
+
+static rom_complex add(rom_complex a, rom_complex b)
+{
+    rom_complex c = {a.re + b.re, a.im + b.im};
+    return c;
+}
+
+static double modulus(rom_complex a)
+{
+    return sqrt(a.re * a.re + a.im * a.im);
+}
+
+/* zeta = (z, conj z) */
+static void pair_with_conjugate(const rom_complex z[], rom_complex zeta[])
+{
+    for (size_t j = 0; j < N_MODE; ++j) {
+        zeta[j] = z[j];
+        zeta[N_MODE + j].re = z[j].re;
+        zeta[N_MODE + j].im = -z[j].im;
+    }
+}
+
+static void complex_monomials(const rom_product product[], size_t n_product, rom_complex p[])
+{
+    for (size_t k = 0; k < n_product; ++k)
+        p[N_REDUCED + k] = multiply(p[product[k].left], p[product[k].right]);
+}
+
+static void complex_tangents(const rom_product product[], size_t n_product, const rom_complex p[], rom_complex dp[])
+{
+    for (size_t k = 0; k < n_product; ++k) {
+        const size_t a = product[k].left, b = product[k].right;
+        dp[N_REDUCED + k] = add(multiply(dp[a], p[b]), multiply(p[a], dp[b]));
+    }
+}
+
+/* rate_j = sum over the stored terms of row j of N */
+static void normal_form_rows(const rom_complex p[], rom_complex rate[])
+{
+    for (size_t j = 0; j < N_MODE; ++j) {
+        rom_complex sum = {0.0, 0.0};
+        for (size_t k = form_row[j]; k < form_row[j + 1]; ++k)
+            sum = add(sum, multiply(form_coefficient[k], p[form_term[k]]));
+        rate[j] = sum;
+    }
+}
+
+/* Sizes that may be 0 come as arguments: compilers object to loops over a constant 0. */
+static void add_inputs(const double u[], size_t n_input, rom_complex rate[])
+{
+    for (size_t i = 0; i < n_input; ++i)
+        for (size_t j = 0; j < N_MODE; ++j) {
+            rate[j].re += input_matrix[i][j].re * u[i];
+            rate[j].im += input_matrix[i][j].im * u[i];
+        }
+}
+
+static void real_monomials(const rom_product product[], size_t n_product, double p[])
+{
+    for (size_t k = 0; k < n_product; ++k)
+        p[N_REDUCED + k] = p[product[k].left] * p[product[k].right];
+}
+
+static void real_tangents(const rom_product product[], size_t n_product, const double p[], double dp[])
+{
+    for (size_t k = 0; k < n_product; ++k) {
+        const size_t a = product[k].left, b = product[k].right;
+        dp[N_REDUCED + k] = dp[a] * p[b] + p[a] * dp[b];
+    }
+}
+
+/* y/s = Re(T p); conjugate pairs of monomials are folded into one when the coefficients are written */
+static void chart_rows(const rom_complex p[], double y[])
+{
+    for (size_t l = 0; l < N_REDUCED; ++l)
+        y[l] = 0.0;
+    for (size_t k = 0; k < N_REDUCED + N_CHART_PRODUCT; ++k)
+        for (size_t l = 0; l < N_REDUCED; ++l)
+            y[l] += chart_re[k][l] * p[k].re - chart_im[k][l] * p[k].im;
+}
+
+static void sensor_rows(const double p[], double x[])
+{
+    for (size_t i = 0; i < N_SENSOR_ROW; ++i)
+        x[i] = 0.0;
+    for (size_t k = 0; k < N_REDUCED + N_SENSOR_PRODUCT; ++k)
+        for (size_t i = 0; i < N_SENSOR_ROW; ++i)
+            x[i] += sensor_coefficient[k][i] * p[k];
+}
+
+void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
+{
+    pair_with_conjugate(z, w->form);
+    complex_monomials(form_product, N_FORM_PRODUCT, w->form);
+    normal_form_rows(w->form, rate);
+    add_inputs(u, N_INPUT, rate);
+}
+
+void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
+{
+    rom_nonlinear_rate(z, u, w, rate);
+    for (size_t j = 0; j < N_MODE; ++j)
+        rate[j] = add(rate[j], multiply(eigenvalue[j], z[j]));
+}
+
+void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
+                      rom_complex drate[])
+{
+    pair_with_conjugate(z, w->form);
+    complex_monomials(form_product, N_FORM_PRODUCT, w->form);
+    pair_with_conjugate(dz, w->form_tangent);
+    complex_tangents(form_product, N_FORM_PRODUCT, w->form, w->form_tangent);
+    normal_form_rows(w->form_tangent, drate);
+    add_inputs(du, N_INPUT, drate);
+    for (size_t j = 0; j < N_MODE; ++j)
+        drate[j] = add(drate[j], multiply(eigenvalue[j], dz[j]));
+}
+
+void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out)
+{
+    pair_with_conjugate(z, w->chart);
+    complex_monomials(chart_product, N_CHART_PRODUCT, w->chart);
+    chart_rows(w->chart, w->sensor);
+    real_monomials(sensor_product, N_SENSOR_PRODUCT, w->sensor);
+    sensor_rows(w->sensor, out->sensor);
+    for (size_t j = 0; j < N_MODE; ++j)
+        out->amplitude[j] = modulus(z[j]);
+    out->trust_ratio = rom_trust_ratio(z);
+}
+
+/* d|z_j| = Re(conj z_j dz_j) / |z_j|; the trust ratio follows the mode that leads it */
+static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
+{
+    double leading = -1.0;
+    for (size_t j = 0; j < N_MODE; ++j) {
+        const double r = modulus(z[j]);
+        dout->amplitude[j] = r > 0.0 ? (z[j].re * dz[j].re + z[j].im * dz[j].im) / r : 0.0;
+        if (r / trained_amplitude[j] > leading) {
+            leading = r / trained_amplitude[j];
+            dout->trust_ratio = dout->amplitude[j] / trained_amplitude[j];
+        }
+    }
+}
+
+void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout)
+{
+    memset(dout, 0, sizeof *dout);
+    rom_output out;
+    rom_outputs(z, w, &out);
+    pair_with_conjugate(dz, w->chart_tangent);
+    complex_tangents(chart_product, N_CHART_PRODUCT, w->chart, w->chart_tangent);
+    chart_rows(w->chart_tangent, w->sensor_tangent);
+    real_tangents(sensor_product, N_SENSOR_PRODUCT, w->sensor, w->sensor_tangent);
+    sensor_rows(w->sensor_tangent, dout->sensor);
+    amplitude_tangents(z, dz, dout);
+}
+
+double rom_trust_ratio(const rom_complex z[])
+{
+    double ratio = 0.0;
+    for (size_t j = 0; j < N_MODE; ++j) {
+        const double r = modulus(z[j]) / trained_amplitude[j];
+        if (!(r <= ratio)) /* a NaN must win */
+            ratio = r;
+    }
+    return ratio;
+}
+
+rom_complex rom_eigenvalue(size_t mode)
+{
+    return eigenvalue[mode];
+}
+
+double rom_trained_amplitude(size_t mode)
+{
+    return trained_amplitude[mode];
+}

@@ -1,0 +1,55 @@
+/* The reduced model: z' = Lambda z + N zeta^E + G u,  y/s = Re(T zeta^E),  x = W (y/s)^E,  x' = W_v (y/s)^E,
+   with zeta = (z_1 .. z_m, conj z_1 .. conj z_m). Nothing here allocates, and no data is ever written but the arguments. */
+#ifndef ROM_KERNEL_H
+#define ROM_KERNEL_H
+
+#include <stddef.h>
+
+#include "rom_names.h"
+
+#define N_REDUCED (2 * N_MODE)
+#define N_SENSOR_ROW (2 * N_SENSOR)
+#define ROM_AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
+
+typedef struct {
+    double re, im;
+} rom_complex;
+
+/* One monomial as the product of two earlier ones; the first 2 m "monomials" are the variables themselves. */
+typedef struct {
+    unsigned short left, right;
+} rom_product;
+
+/* Monomials and their tangents; kept with the instance so that no step needs memory or much stack. */
+typedef struct {
+    rom_complex form[N_REDUCED + N_FORM_PRODUCT], form_tangent[N_REDUCED + N_FORM_PRODUCT];
+    rom_complex chart[N_REDUCED + N_CHART_PRODUCT], chart_tangent[N_REDUCED + N_CHART_PRODUCT];
+    double sensor[N_REDUCED + N_SENSOR_PRODUCT], sensor_tangent[N_REDUCED + N_SENSOR_PRODUCT];
+} rom_workspace;
+
+typedef struct {
+    double sensor[ROM_AT_LEAST_ONE(N_SENSOR_ROW)]; /* displacements in m, then velocities in m/s */
+    double amplitude[N_MODE];                      /* |z_j| */
+    double trust_ratio;                            /* max_j |z_j| / trained_j */
+} rom_output;
+
+/* N zeta^E + G u, 1/s */
+void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[]);
+
+/* z' = Lambda z + N zeta^E + G u, 1/s */
+void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[]);
+
+/* d z' along (dz, du), 1/s */
+void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
+                      rom_complex drate[]);
+
+void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out);
+
+/* d outputs along dz; at z_j = 0, where |z_j| has a kink, its derivative is taken as 0 */
+void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout);
+
+double rom_trust_ratio(const rom_complex z[]);
+rom_complex rom_eigenvalue(size_t mode);
+double rom_trained_amplitude(size_t mode);
+
+#endif

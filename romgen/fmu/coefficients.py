@@ -1,0 +1,157 @@
+"""The two generated C headers: sizes and coefficients of one model."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from romgen.arrays import ComplexArray, FloatArray, IntArray
+from romgen.errors import InputError
+from romgen.fmu.programme import MonomialProgramme, fold_conjugates, monomial_programme
+from romgen.polynomial import Scalar
+from romgen.reduced_model import ReducedModel
+
+HARD_LIMIT = 3.0
+"""Default of the parameter hard_limit, in trained amplitudes."""
+
+MAX_PRODUCTS = 60000
+"""Monomials are numbered by 16-bit integers in the runtime."""
+
+
+def max_internal_step(model: ReducedModel) -> float:
+    """Longest internal step h_max = min(1e-4 s, 1 / (20 f_max)), s."""
+    f_max = float(np.max(model.eigenvalues.imag)) / (2.0 * math.pi)
+    return min(1e-4, 1.0 / (20.0 * f_max))
+
+
+def coefficients_header(model: ReducedModel) -> str:
+    """The text of coefficients.h: constant data only, decimal numbers that read back exactly."""
+    chart = fold_conjugates(model.chart)
+    form_programme = monomial_programme(model.normal_form.exponents)
+    chart_programme = monomial_programme(chart.exponents)
+    sensor_programme = _sensor_programme(model)
+    chart_dense = _dense(chart_programme, chart.exponents, chart.coefficients)
+    sensors = np.vstack(
+        [
+            _dense(sensor_programme, model.displacement.exponents, model.displacement.coefficients),
+            _dense(sensor_programme, model.velocity.exponents, model.velocity.coefficients),
+        ]
+    )
+    return "\n".join(
+        [
+            f"/* Coefficients of the reduced model {model.name}; generated, data only. */",
+            "#ifndef COEFFICIENTS_H",
+            "#define COEFFICIENTS_H",
+            "",
+            '#include "rom_kernel.h"',
+            "",
+            _array("rom_complex eigenvalue[N_MODE]", map(_complex, model.eigenvalues)),
+            _array("double trained_amplitude[N_MODE]", map(_real, model.trained_amplitude)),
+            _array("rom_complex input_matrix[ROM_AT_LEAST_ONE(N_INPUT)][N_MODE]", _input_rows(model.input_matrix)),
+            _products("form", form_programme),
+            _normal_form(model, form_programme),
+            _products("chart", chart_programme),
+            _array("double chart_re[N_REDUCED + N_CHART_PRODUCT][N_REDUCED]", map(_row, chart_dense.real.T)),
+            _array("double chart_im[N_REDUCED + N_CHART_PRODUCT][N_REDUCED]", map(_row, chart_dense.imag.T)),
+            _products("sensor", sensor_programme),
+            _array("double sensor_coefficient[N_REDUCED + N_SENSOR_PRODUCT][N_SENSOR_ROW]", map(_row, sensors.T)),
+            "#endif",
+            "",
+        ]
+    )
+
+
+def sizes_header(model: ReducedModel, guid: str, coefficients: str) -> str:
+    """The text of model_sizes.h: identity and sizes of the model."""
+    form = monomial_programme(model.normal_form.exponents)
+    chart = monomial_programme(fold_conjugates(model.chart).exponents)
+    sizes = {
+        "N_MODE": len(model.eigenvalues),
+        "N_INPUT": len(model.inputs),
+        "N_SENSOR": len(model.sensors),
+        "N_FORM_PRODUCT": len(form.products),
+        "N_FORM_TERM": int(np.count_nonzero(model.normal_form.coefficients)),
+        "N_CHART_PRODUCT": len(chart.products),
+        "N_SENSOR_PRODUCT": len(_sensor_programme(model).products),
+        "DEFAULT_HARD_LIMIT": _real(HARD_LIMIT),
+        "DEFAULT_MAX_INTERNAL_STEP": _real(max_internal_step(model)),
+        "MODEL_IDENTIFIER": model.name,
+        "MODEL_GUID": f'"{guid}"',
+        "MODEL_HASH": f"UINT64_C(0x{hashlib.sha256(coefficients.encode()).hexdigest()[:16]})",
+    }
+    lines = [f"#define {name} {value}" for name, value in sizes.items()]
+    head = f"/* Identity and sizes of the reduced model {model.name}; generated. */"
+    return "\n".join([head, "#ifndef MODEL_SIZES_H", "#define MODEL_SIZES_H", "", *lines, "", "#endif", ""])
+
+
+def _sensor_programme(model: ReducedModel) -> MonomialProgramme:
+    return monomial_programme(np.vstack([model.displacement.exponents, model.velocity.exponents]))
+
+
+def _dense(
+    programme: MonomialProgramme, exponents: IntArray, coefficients: npt.NDArray[Scalar]
+) -> npt.NDArray[Scalar]:
+    """Coefficients over every monomial of the programme, (n_out, n_monomial)."""
+    dense = np.zeros((coefficients.shape[0], programme.n_monomial), dtype=coefficients.dtype)
+    for k, row in enumerate(exponents):
+        dense[:, programme.index[tuple(int(e) for e in row)]] += coefficients[:, k]
+    return dense
+
+
+def _normal_form(model: ReducedModel, programme: MonomialProgramme) -> str:
+    """The nonzero terms of N row by row."""
+    position = [programme.index[tuple(int(e) for e in row)] for row in model.normal_form.exponents]
+    starts, terms, values = [0], [], []
+    for row in model.normal_form.coefficients:
+        used = np.flatnonzero(row)
+        terms += [position[k] for k in used]
+        values += [_complex(row[k]) for k in used]
+        starts.append(len(terms))
+    return "\n".join(
+        [
+            _array("unsigned form_row[N_MODE + 1]", map(str, starts)),
+            _array("unsigned short form_term[ROM_AT_LEAST_ONE(N_FORM_TERM)]", map(str, terms or [0])),
+            _array("rom_complex form_coefficient[ROM_AT_LEAST_ONE(N_FORM_TERM)]", values or [_complex(0j)]),
+        ]
+    )
+
+
+def _products(name: str, programme: MonomialProgramme) -> str:
+    if programme.n_monomial > MAX_PRODUCTS:
+        raise InputError(
+            f"the {name} map has too many monomials", where="FMU export", value=programme.n_monomial, advice="lower the order"
+        )
+    size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_PRODUCT)"
+    pairs = [f"{{{left}, {right}}}" for left, right in programme.products] or ["{0, 0}"]
+    return _array(f"rom_product {name}_product[{size}]", pairs)
+
+
+def _array(declaration: str, items: Iterable[str]) -> str:
+    lines, line = [], "   "
+    for item in items:
+        if len(line) + len(item) > 116:
+            lines.append(line)
+            line = "   "
+        line += f" {item},"
+    return "\n".join([f"static const {declaration} = {{", *lines, line, "};", ""])
+
+
+def _input_rows(matrix: ComplexArray) -> Sequence[str]:
+    rows = ["{" + ", ".join(map(_complex, column)) + "}" for column in matrix.T]
+    return rows or ["{" + ", ".join([_complex(0j)] * len(matrix)) + "}"]
+
+
+def _row(values: FloatArray) -> str:
+    return "{" + ", ".join(map(_real, values)) + "}"
+
+
+def _complex(value: complex) -> str:
+    return f"{{{_real(value.real)}, {_real(value.imag)}}}"
+
+
+def _real(value: float) -> str:
+    return repr(float(value))

@@ -1,0 +1,135 @@
+"""Compilers of the runtime: the ziglang wheel for every platform, or the host's own compiler for this machine."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from romgen.errors import InputError, RomgenError
+
+TARGETS: dict[str, tuple[str, ...]] = {
+    "linux64": ("x86_64-linux-gnu.2.17",),
+    "win64": ("x86_64-windows-gnu",),
+    "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+    "aarch64-linux": ("aarch64-linux-gnu.2.17",),
+    "aarch64-darwin": ("aarch64-macos.11.0",),
+}
+"""Zig targets of each FMI platform; two targets make one universal file."""
+
+FLAGS = ("-std=c99", "-O2", "-s", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+"""No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """One way to turn C sources into a shared library.
+
+    Attributes
+    ----------
+    name : shown in the export record.
+    command : program and leading arguments.
+    is_zig : whether it takes a target and serves every platform.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    is_zig: bool
+
+
+def host_platform() -> str:
+    """FMI platform of this machine, e.g. "linux64"."""
+    arm = platform.machine().lower() in {"aarch64", "arm64"}
+    names = {"Linux": "aarch64-linux" if arm else "linux64", "Windows": "win64", "Darwin": "darwin64"}
+    if platform.system() not in names:
+        raise InputError("no FMI platform is known for this system", where="FMU export", value=platform.system())
+    return names[platform.system()]
+
+
+def requested_platforms(platforms: tuple[str, ...]) -> tuple[str, ...]:
+    """Names in the order of TARGETS, with "host" and "all" resolved.
+
+    Raises
+    ------
+    InputError : for a platform that is not in TARGETS.
+    """
+    unknown = [p for p in platforms if p not in {*TARGETS, "host", "all"}]
+    if unknown:
+        raise InputError(
+            "unknown platform", where="[fmu] platforms", value=unknown[0], advice=f"use host, all or {', '.join(TARGETS)}"
+        )
+    wanted = {host_platform() if p == "host" else p for p in platforms}
+    return tuple(TARGETS) if "all" in wanted else tuple(p for p in TARGETS if p in wanted)
+
+
+def find_compiler() -> Compiler | None:
+    """The ziglang wheel if installed, else the compiler in CC or on the path, else None."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return Compiler("zig", (sys.executable, "-m", "ziglang", "cc"), True)
+    for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
+        program = shutil.which(name) if name else None
+        if program:
+            return Compiler(Path(program).name, (program,), False)
+    return None
+
+
+def compile_library(compiler: Compiler, target: str | None, sources: Path, output: Path) -> None:
+    """Compile all C files of a folder into the shared library ``output``.
+
+    The output name is written into Windows and macOS libraries, so it must be the final file name; paths are relative
+    to the folder, so that the bytes do not depend on where it lies.
+
+    Raises
+    ------
+    RomgenError : with the compiler's own words when it fails.
+    """
+    files = sorted(path.name for path in sources.glob("*.c"))
+    target_flags = ["-target", target] if target else []
+    libraries = [] if target and "windows" in target else ["-lm"]
+    command = [*compiler.command, *target_flags, *FLAGS, "-o", str(output), *files, *libraries]
+    result = subprocess.run(command, cwd=sources, env=_environment(), capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        raise RomgenError(
+            f"{compiler.name} could not compile the runtime",
+            where=f"FMU export, target {target or 'host'}",
+            value=result.stderr.strip()[-2000:],
+            advice="check the compiler, or export with platforms = [] for a source-only unit",
+        )
+
+
+def cache_folder() -> Path:
+    """Where zig keeps the C libraries it has built, once per user."""
+    if platform.system() == "Windows":
+        base = Path(os.environ.get("LOCALAPPDATA", str(Path.home() / "AppData" / "Local")))
+    elif platform.system() == "Darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
+    return base / "romgen" / "zig"
+
+
+def is_first_use(platform_name: str) -> bool:
+    """Whether zig has still to build the C library of a platform (about two minutes for Windows)."""
+    return not _mark(platform_name).exists()
+
+
+def remember_use(platform_name: str) -> None:
+    """Note that the C library of a platform is built."""
+    _mark(platform_name).parent.mkdir(parents=True, exist_ok=True)
+    _mark(platform_name).touch()
+
+
+def _mark(platform_name: str) -> Path:
+    return cache_folder() / f"{platform_name}.ready"
+
+
+def _environment() -> dict[str, str]:
+    """The caller's environment, with zig's caches in the user's cache folder unless set already."""
+    folder = cache_folder()
+    defaults = {"ZIG_GLOBAL_CACHE_DIR": str(folder / "global"), "ZIG_LOCAL_CACHE_DIR": str(folder / "local")}
+    return {**defaults, **os.environ}

@@ -1,0 +1,89 @@
+"""Export of a reduced model as a native FMI 2.0 unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from romgen.fmu.archive import archive_bytes, write_atomically
+from romgen.fmu.build import build_binaries
+from romgen.fmu.coefficients import coefficients_header, sizes_header
+from romgen.fmu.description import content_guid, documentation_page, generation_time, model_description
+from romgen.fmu.interface import build_interface
+from romgen.fmu.model_file import model_json
+from romgen.fmu.records import FmuExport, FmuInfo
+from romgen.fmu.selection import exported_model
+from romgen.fmu.templates import licence_files, runtime_sources
+from romgen.progress import Report
+from romgen.reduced_model import ReducedModel
+from romgen.settings import FmuSettings
+
+
+def _silent(fraction: float, text: str) -> None:
+    """Report nothing."""
+
+
+def export_fmu(
+    model: ReducedModel,
+    path: Path | str,
+    settings: FmuSettings,
+    *,
+    info: FmuInfo | None = None,
+    report: Report = _silent,
+) -> FmuExport:
+    """Write a model as one archive for FMI 2.0 Co-Simulation and Model Exchange.
+
+    The same model, settings, information and compiler give the same bytes in any folder and at any time.
+
+    Parameters
+    ----------
+    model : the reduced model.
+    path : file to write.
+    settings : sensors, platforms and step size.
+    info : texts of the description and the documentation.
+    report : told the finished fraction while compilers run; the first Windows build takes about two minutes.
+
+    Raises
+    ------
+    InputError : for a model or settings that cannot be exported.
+    RomgenError : when a compiler fails.
+    """
+    info = info or FmuInfo()
+    chosen = exported_model(model, settings.sensors)
+    content, guid = _content(chosen, settings, info)
+    sources = {Path(name).name: data for name, data in content.items() if name.startswith("sources/")}
+    binaries = build_binaries(chosen.name, sources, settings.platforms, report)
+    data = archive_bytes({**content, **binaries.files})
+    sha256 = write_atomically(Path(path), data)
+    return FmuExport(str(path), len(data), sha256, guid, binaries.platforms, binaries.compiler, binaries.notes)
+
+
+def generated_sources(model: ReducedModel, guid: str) -> dict[str, bytes]:
+    """All C files of a unit by name: the runtime, the FMI headers and the two generated headers."""
+    coefficients = coefficients_header(model)
+    generated = {"coefficients.h": coefficients, "model_sizes.h": sizes_header(model, guid, coefficients)}
+    return {**runtime_sources(), **{name: text.encode() for name, text in generated.items()}}
+
+
+def _content(model: ReducedModel, settings: FmuSettings, info: FmuInfo) -> tuple[dict[str, bytes], str]:
+    """Everything in the archive but the binaries, and the identifier made from it."""
+    interface = build_interface(model, info.input_range)
+    source_files = tuple(sorted(name for name in runtime_sources() if name.endswith(".c")))
+
+    def description(guid: str, date: str) -> str:
+        return model_description(
+            model, interface, info, step_size=settings.step_size, source_files=source_files, guid=guid, date=date
+        )
+
+    undated = description("", "")
+    unnamed = generated_sources(model, "")
+    guid = content_guid(undated, *(data for _, data in sorted(unnamed.items())))
+    content = {
+        "modelDescription.xml": description(guid, generation_time()).encode(),
+        "documentation/index.html": documentation_page(model, interface, info).encode(),
+        "resources/rom.json": model_json(model).encode(),
+        **licence_files(),
+        **{f"sources/{name}": data for name, data in generated_sources(model, guid).items()},
+    }
+    if info.picture is not None:
+        content["model.png"] = info.picture
+    return content, guid

@@ -1,0 +1,106 @@
+"""What goes into an exported unit besides the model, and what comes out of export and check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from romgen.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class FmuInfo:
+    """What the description and the documentation page of a unit say beyond the equations.
+
+    Attributes
+    ----------
+    description : one sentence on the structure.
+    author, copyright, license : as shown by the importing tool.
+    version : version of the model.
+    origin : how the model was made, one entry per line of the documentation page.
+    errors_percent : (trajectory, NMTE in percent) rows of the error table.
+    input_range : (minimum, maximum) of each model input in training, SI units, or () where unknown.
+    stop_time : s, of the default experiment.
+    picture : PNG bytes of the icon, or None.
+    """
+
+    description: str = "Reduced model of a nonlinear structure on a spectral submanifold"
+    author: str = ""
+    copyright: str = ""
+    license: str = "see documentation/licenses/license.txt"
+    version: str = "1.0"
+    origin: tuple[str, ...] = ()
+    errors_percent: tuple[tuple[str, float], ...] = ()
+    input_range: tuple[tuple[float, float], ...] = ()
+    stop_time: float = 1.0
+    picture: bytes | None = None
+
+
+@dataclass(frozen=True)
+class FmuExport:
+    """One written unit.
+
+    Attributes
+    ----------
+    path : the file.
+    size_bytes : its size.
+    sha256 : hash of the file.
+    guid : identifier that binds description and binary.
+    platforms : platforms with a binary, () for a source-only unit.
+    compiler : what compiled them, or "none".
+    notes : everything that differs from what was asked for, one sentence each.
+    """
+
+    path: str
+    size_bytes: int
+    sha256: str
+    guid: str
+    platforms: tuple[str, ...]
+    compiler: str
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FmuReplay:
+    """A motion computed by a unit.
+
+    Attributes
+    ----------
+    t : (n_time,) s.
+    state : (n_time, 2m) re z_1, im z_1, re z_2, ...
+    displacement, velocity : (n_time, n_sensor) m and m/s.
+    trust_ratio : (n_time,) max_j |z_j| / trained_j.
+    """
+
+    t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
+    state: FloatArray = field(metadata={"unit": "1", "axes": "time,state"})
+    displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
+    velocity: FloatArray = field(metadata={"unit": "m/s", "axes": "time,sensor"})
+    trust_ratio: FloatArray = field(metadata={"unit": "1", "axes": "time"})
+
+
+@dataclass(frozen=True)
+class FmuCheck:
+    """How far exported units are from the standard and from the Python model under the same input.
+
+    Each error is the largest absolute difference of a quantity over the run divided by its largest magnitude, then the
+    largest over states, displacements and velocities.
+
+    Attributes
+    ----------
+    fmpy_problems : what fmpy's validator says about the native unit.
+    native_vs_python_rel : largest of the three runs below.
+    native_free_rel : zero input from a start state.
+    native_held_rel, native_linear_rel : forced, input held in each step, or linear through input derivatives.
+    pythonfmu_problems, pythonfmu_vs_python_rel : the same for the pythonfmu unit (free and held), () and None without.
+    step_size, n_step : s and number of communication steps of each run.
+    """
+
+    fmpy_problems: tuple[str, ...]
+    native_vs_python_rel: float
+    native_free_rel: float
+    native_held_rel: float
+    native_linear_rel: float
+    pythonfmu_problems: tuple[str, ...]
+    pythonfmu_vs_python_rel: float | None
+    step_size: float
+    n_step: int

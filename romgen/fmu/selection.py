@@ -1,0 +1,64 @@
+"""What of a model goes into a unit: chosen sensors, and the checks at the door."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+
+from romgen.errors import InputError
+from romgen.polynomial import PolynomialMap
+from romgen.reduced_model import ReducedModel
+
+WHERE = "FMU export"
+
+
+def exported_model(model: ReducedModel, sensors: tuple[str, ...] | None) -> ReducedModel:
+    """The model with the chosen sensors (all if None), fit for export.
+
+    Raises
+    ------
+    InputError : for an unknown or no sensor, a name that is no C identifier, numbers that are not finite, a mode without
+        oscillation, or a mode that was never excited in training.
+    """
+    _check_identifier(model.name)
+    chosen = _with_sensors(model, model.sensors if sensors is None else sensors)
+    for name, values in (
+        ("eigenvalues", chosen.eigenvalues),
+        ("normal_form", chosen.normal_form.coefficients),
+        ("chart", chosen.chart.coefficients),
+        ("displacement", chosen.displacement.coefficients),
+        ("velocity", chosen.velocity.coefficients),
+        ("input_matrix", chosen.input_matrix),
+        ("trained_amplitude", chosen.trained_amplitude),
+    ):
+        if not np.all(np.isfinite(values)):
+            raise InputError(f"{name} holds numbers that are not finite", where=WHERE, advice="learn the model again")
+    if not np.all(chosen.eigenvalues.imag > 0.0):
+        raise InputError("a mode does not oscillate", where=WHERE, value=chosen.eigenvalues)
+    if not np.all(chosen.trained_amplitude > 0.0):
+        advice = "add a training motion that excites every master mode"
+        raise InputError("a mode was never excited in training", where=WHERE, value=chosen.trained_amplitude, advice=advice)
+    return chosen
+
+
+def _check_identifier(name: str) -> None:
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+        advice = "use letters, digits and underscores, no digit first"
+        raise InputError("the model name is no identifier", where=WHERE, value=name, advice=advice)
+
+
+def _with_sensors(model: ReducedModel, names: tuple[str, ...]) -> ReducedModel:
+    unknown = [name for name in names if name not in model.sensors]
+    if unknown or not names:
+        value = unknown[0] if unknown else "an empty list"
+        advice = f"choose from {', '.join(model.sensors)}"
+        raise InputError("unknown sensor", where="[fmu] sensors", value=value, advice=advice)
+    rows = [model.sensors.index(name) for name in names]
+    return dataclasses.replace(
+        model,
+        sensors=names,
+        displacement=PolynomialMap(model.displacement.exponents, model.displacement.coefficients[rows]),
+        velocity=PolynomialMap(model.velocity.exponents, model.velocity.coefficients[rows]),
+    )

@@ -1,0 +1,83 @@
+"""A small random, stable reduced model for the tests of the exported units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from romgen.arrays import ComplexArray, FloatArray
+from romgen.polynomial import PolynomialMap, exponents
+from romgen.reduced_model import ReducedModel
+
+SENSORS = ("lower", "mid span", "upper")
+
+
+def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "random_panel") -> ReducedModel:
+    """Two modes near 110 and 221 Hz with 0.4 % damping, terms of the 1:2 resonance, three sensors.
+
+    Coefficients of degree d fall as 1/d!; amplitudes of order 1 are trained.
+    """
+    rng = np.random.default_rng(seed)
+    omega = 2.0 * np.pi * np.array([110.0, 221.0])
+    lam: ComplexArray = omega * (-0.004 + 1j * np.sqrt(1.0 - 0.004**2))
+    form = exponents(4, 2, order)
+    real = exponents(4, 1, order)
+    resonant = np.stack([_is_resonant(form, 1), _is_resonant(form, 2)])
+    decay = _decay(form)
+    n = 60.0 * resonant * decay * (rng.standard_normal(resonant.shape) * 0.3 + 1j * rng.standard_normal(resonant.shape))
+    chart = 0.05 * _decay(real) * _complex(rng, (4, len(real)))
+    for j in range(2):
+        chart[j, j] += 1.0
+        chart[2 + j, j] += 1j
+    x = 1e-3 * _decay(real) * rng.standard_normal((3, len(real)))
+    v = 1e-3 * omega[0] * _decay(real) * rng.standard_normal((3, len(real)))
+    return ReducedModel(
+        name=name,
+        eigenvalues=lam,
+        normal_form=PolynomialMap(form[np.any(resonant, axis=0)], n[:, np.any(resonant, axis=0)]),
+        chart=PolynomialMap(real, chart),
+        inverse_chart=PolynomialMap(real, _complex(rng, (2, len(real)))),
+        scale=np.ones(4),
+        displacement=PolynomialMap(real, x),
+        velocity=PolynomialMap(real, v),
+        sensors=SENSORS,
+        inputs=("base_acceleration", "shaker force")[:n_input],
+        input_units=("m/s2", "N")[:n_input],
+        input_matrix=0.4 * _complex(rng, (2, n_input)),
+        internal_resonance=(1, 2),
+        trained_amplitude=np.array([1.0, 0.8]),
+    )
+
+
+def random_states(model: ReducedModel, n: int, seed: int = 1) -> ComplexArray:
+    """(n, m) states inside the trained range."""
+    rng = np.random.default_rng(seed)
+    radius = model.trained_amplitude * rng.uniform(0.0, 1.0, (n, len(model.eigenvalues)))
+    phase = np.exp(2j * np.pi * rng.uniform(0.0, 1.0, radius.shape))
+    z: ComplexArray = radius * phase
+    return z
+
+
+def smooth_input(n_time: int, step: float, n_input: int = 1, seed: int = 3) -> FloatArray:
+    """(n_time, n_input) random sums of sines below 300 Hz, about 30 in their unit."""
+    rng = np.random.default_rng(seed)
+    t = step * np.arange(n_time)[:, None]
+    u = np.zeros((n_time, n_input))
+    for f in np.linspace(20.0, 300.0, 15):
+        u += rng.standard_normal(n_input) * 8.0 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.28, n_input))
+    return u
+
+
+def _is_resonant(e: np.ndarray[tuple[int, int], np.dtype[np.int64]], r: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return (e @ np.array([1, 2, -1, -2])) == r
+
+
+def _decay(e: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> FloatArray:
+    degree = np.sum(e, axis=1)
+    factorial = np.cumprod(np.arange(1.0, np.max(degree) + 1.0))
+    decay: FloatArray = 1.0 / factorial[degree - 1]
+    return decay
+
+
+def _complex(rng: np.random.Generator, shape: tuple[int, int]) -> ComplexArray:
+    c: ComplexArray = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    return c
