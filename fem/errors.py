@@ -40,3 +40,4 @@ class FemConvergenceError(FemError):
     ) -> None:
         super().__init__(what, where=where, value=value, advice=advice)
         self.history = history
+        self.last_good: object = None

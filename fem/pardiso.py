@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import time
+import weakref
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 from pypardiso import PyPardisoSolver
 
@@ -27,27 +30,26 @@ class Pardiso:
     name = "pardiso"
 
     def __init__(self, *, symmetric: bool, single: bool = False) -> None:
-        self._call = PyPardisoSolver()._mkl_pardiso
         self._mtype = _SPD if symmetric else _UNSYMMETRIC
         self._dtype: Any = np.float32 if single else np.float64
-        self._pt = np.zeros(64, dtype=np.int64)
-        self._iparm = np.zeros(64, dtype=np.int32)
-        self._iparm[[0, 1, 9, 17, 34]] = 1, 2, 13, -1, 1
-        self._iparm[27] = int(single)
+        self._handle = _Handle(PyPardisoSolver()._mkl_pardiso, self._mtype)
+        self._handle.iparm[27] = int(single)
         if not symmetric:
-            self._iparm[[10, 12]] = 1, 1
-        self._matrix: sp.csr_matrix | None = None
+            self._handle.iparm[[10, 12]] = 1, 1
+        self._matrix = sp.csr_matrix((0, 0))
         self._seconds = {"analyse": 0.0, "factor": 0.0, "solve": 0.0}
         self._solves = 0
+        # A finaliser also runs at exit, before the interpreter tears down the modules that the call needs.
+        weakref.finalize(self, self._handle.call, _RELEASE, self._matrix)
 
     def analyse(self, matrix: sp.csr_matrix) -> None:
         """Order the unknowns for the pattern of ``matrix``."""
-        self._set(matrix)
+        self._store(matrix)
         self._timed("analyse", _ANALYSE)
 
     def factor(self, matrix: sp.csr_matrix) -> None:
         """Factor ``matrix``, which has the analysed pattern."""
-        self._set(matrix)
+        self._store(matrix)
         self._timed("factor", _FACTOR)
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -61,34 +63,43 @@ class Pardiso:
     @property
     def statistics(self) -> SolverStatistics:
         """Times, entries of the factor and memory so far."""
-        memory = 1024 * int(max(self._iparm[14], self._iparm[15] + self._iparm[16]))
-        return SolverStatistics(self.name, int(self._iparm[17]), memory, self._solves, **self._seconds)
+        iparm = self._handle.iparm
+        memory = 1024 * int(max(iparm[14], iparm[15] + iparm[16]))
+        return SolverStatistics(self.name, int(iparm[17]), memory, self._solves, **self._seconds)
 
-    def __del__(self) -> None:
-        if self._matrix is not None:
-            self._run(_RELEASE)
-
-    def _set(self, matrix: sp.csr_matrix) -> None:
+    def _store(self, matrix: sp.csr_matrix) -> None:
         stored = sp.triu(matrix, format="csr") if self._mtype == _SPD else matrix.tocsr()
         stored.sort_indices()
-        indices = (stored.indptr.astype(np.int32), stored.indices.astype(np.int32))
-        self._matrix = sp.csr_matrix((stored.data.astype(self._dtype), indices[1], indices[0]), shape=stored.shape)
+        indptr, indices = stored.indptr.astype(np.int32), stored.indices.astype(np.int32)
+        self._matrix = sp.csr_matrix((stored.data.astype(self._dtype), indices, indptr), shape=stored.shape)
 
     def _timed(self, key: str, phase: int, b: FloatArray | None = None, x: FloatArray | None = None) -> None:
         start = time.perf_counter()
-        error = self._run(phase, b, x)
+        error = self._handle.call(phase, self._matrix, b, x)
         self._seconds[key] += time.perf_counter() - start
         if error:
             advice = "the matrix is singular or indefinite: look for an unconstrained or loose body"
             raise FemConvergenceError("direct solver failed", where=f"pardiso {key}", value=error, advice=advice)
 
-    def _run(self, phase: int, b: FloatArray | None = None, x: FloatArray | None = None) -> int:
-        matrix = self._matrix
-        if matrix is None:
-            raise FemConvergenceError("solve before analyse", where="pardiso")
+
+class _Handle:
+    """MKL's own memory and parameters of one factorisation."""
+
+    def __init__(self, function: Callable[..., None], mtype: int) -> None:
+        self._function, self._mtype = function, mtype
+        self._pt = np.zeros(64, dtype=np.int64)
+        self.iparm = np.zeros(64, dtype=np.int32)
+        # 1: own parameters; 2: METIS; 10: pivot perturbation; 18: report entries; 35: zero-based indices.
+        self.iparm[[0, 1, 9, 17, 34]] = 1, 2, 13, -1, 1
+
+    def call(
+        self, phase: int, matrix: sp.csr_matrix, b: npt.NDArray[Any] | None = None, x: npt.NDArray[Any] | None = None
+    ) -> int:
+        """One phase; returns MKL's error code."""
         one, zero, error = ctypes.c_int32(1), ctypes.c_int32(0), ctypes.c_int32(0)
         columns = 1 if b is None or b.ndim == 1 else b.shape[1]
-        self._call(
+        integers = ctypes.POINTER(ctypes.c_int32)
+        self._function(
             self._pt.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),
             ctypes.byref(one),
             ctypes.byref(one),
@@ -96,11 +107,11 @@ class Pardiso:
             ctypes.byref(ctypes.c_int32(phase)),
             ctypes.byref(ctypes.c_int32(matrix.shape[0])),
             matrix.data.ctypes.data_as(ctypes.c_void_p),
-            matrix.indptr.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)),
-            matrix.indices.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)),
+            matrix.indptr.ctypes.data_as(integers),
+            matrix.indices.ctypes.data_as(integers),
             ctypes.byref(zero),
             ctypes.byref(ctypes.c_int32(columns)),
-            self._iparm.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)),
+            self.iparm.ctypes.data_as(integers),
             ctypes.byref(zero),
             None if b is None else b.ctypes.data_as(ctypes.c_void_p),
             None if x is None else x.ctypes.data_as(ctypes.c_void_p),

@@ -1,0 +1,93 @@
+"""Undamped modes about an equilibrium with stuck contact, and Rayleigh damping from two ratios."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from fem.arrays import FloatArray
+from fem.errors import FemConvergenceError, FemInputError
+from fem.linear_solver import make_solver
+from fem.model import Model
+from fem.preload import StaticState
+
+
+@dataclass(frozen=True)
+class ModalBasis:
+    """Modes K phi = omega^2 M phi, Phi' M Phi = I, largest component positive.
+
+    Attributes
+    ----------
+    omega : (n_mode,) rad/s.
+    shapes : (n_dof, n_mode) kg^-0.5.
+    left : (n_dof, n_mode) M Phi.
+    stiffness : tangent of the bodies at the equilibrium without contact, N/m.
+    """
+
+    omega: FloatArray
+    shapes: FloatArray
+    left: FloatArray
+    stiffness: sp.csr_matrix
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """C = alpha M + beta K with K the tangent of the bodies at the equilibrium (contact adds no viscous damping)."""
+
+    alpha: float
+    beta: float
+
+
+def solve_modes(model: Model, state: StaticState, count: int, *, solver: str = "auto") -> ModalBasis:
+    """The lowest ``count`` modes by shift-invert Lanczos at 0.
+
+    Closed points are stuck (k_n, k_t), open points carry nothing. Without contact and supports the shift needs stiffness:
+    a singular tangent raises ``FemConvergenceError``.
+    """
+    elastic = model.elastic_tangent(state.u)
+    tangent = model.constrain(elastic + model.contact.stick_tangent(state.contact.status[:, 0]))
+    direct = make_solver(solver, symmetric=True)
+    direct.analyse(tangent)
+    direct.factor(tangent)
+    keep = sp.diags(model.free.astype(float))
+    mass = (keep @ model.mass @ keep).tocsr()
+    operator = spla.LinearOperator(tangent.shape, matvec=direct.solve, dtype=np.float64)
+    # Supported rows have stiffness 1 and mass 0: infinite eigenvalues, which shift-invert never meets.
+    start = np.where(model.free, np.sin(1.0 + np.arange(model.n_dof)), 0.0)
+    values, shapes = spla.eigsh(tangent, count, mass, sigma=0.0, OPinv=operator, v0=start)
+    if np.any(values <= 0.0):
+        raise FemConvergenceError(
+            "the tangent is not positive definite", where="modes", value=float(values.min()), advice="check the preload"
+        )
+    order = np.argsort(values)
+    shapes = shapes[:, order]
+    shapes /= np.sqrt(np.einsum("nm,nm->m", shapes, mass @ shapes))
+    shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(count)])
+    return ModalBasis(np.sqrt(values[order]), np.ascontiguousarray(shapes), np.asarray(mass @ shapes), elastic)
+
+
+def rayleigh(modes: ModalBasis, which: tuple[int, int], ratios: tuple[float, float]) -> Rayleigh:
+    """alpha and beta that give two modes (numbered from 0) their damping ratios.
+
+    2 zeta_j omega_j = alpha + beta kappa_j with kappa_j = phi_j' K phi_j, which is omega_j^2 less the share of the contact.
+    """
+    kappa = modal_stiffness(modes)[list(which)]
+    right = 2.0 * np.array(ratios) * modes.omega[list(which)]
+    alpha, beta = np.linalg.solve(np.column_stack([np.ones(2), kappa]), right)
+    if alpha < 0.0 or beta < 0.0:
+        advice = "choose ratios that C = alpha M + beta K can reach with positive coefficients"
+        raise FemInputError("negative Rayleigh coefficient", where="damping", value=(float(alpha), float(beta)), advice=advice)
+    return Rayleigh(float(alpha), float(beta))
+
+
+def modal_stiffness(modes: ModalBasis) -> FloatArray:
+    """kappa_j = phi_j' K phi_j of the bodies, (n_mode,) 1/s^2."""
+    return np.asarray(np.einsum("nm,nm->m", modes.shapes, modes.stiffness @ modes.shapes))
+
+
+def damping_ratios(modes: ModalBasis, damping: Rayleigh) -> FloatArray:
+    """zeta_j = (alpha + beta kappa_j) / (2 omega_j)."""
+    return np.asarray((damping.alpha + damping.beta * modal_stiffness(modes)) / (2.0 * modes.omega))

@@ -1,0 +1,348 @@
+"""Ring-downs and forced transients by the generalised-alpha method, several cases marching together.
+
+Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375:
+
+    M a_(n+1-am) + C v_(n+1-af) + (1-af) f_(n+1) + af f_n = (1-af) p_(n+1) + af p_n
+    u_(n+1) = u_n + h v_n + h^2 ((1/2-b) a_n + b a_(n+1)),   v_(n+1) = v_n + h ((1-g) a_n + g a_(n+1))
+
+The unknown is a_(n+1). One factor of the iteration matrix at the preloaded, stuck state serves all steps and all cases as
+preconditioner inside Anderson acceleration, so that its precision never enters the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.optimize import brentq
+
+from fem.anderson import Anderson
+from fem.arrays import FloatArray, IntArray
+from fem.contact import ContactState
+from fem.corotation import NodalRotation, rotate
+from fem.errors import FemConvergenceError, FemInputError
+from fem.linear_solver import LinearSolver, make_solver
+from fem.modes import ModalBasis, Rayleigh
+from fem.model import Model
+from fem.preload import StaticState
+from fem.sparse_product import SparseProduct
+
+Excitation = Callable[[float], FloatArray]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Coefficients of generalised-alpha for a spectral radius rho at infinite frequency."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @staticmethod
+    def from_radius(rho: float) -> Scheme:
+        """Second order, unconditionally stable for 0 <= rho <= 1 (Chung & Hulbert, eqs. 17, 20, 25)."""
+        if not 0.0 <= rho <= 1.0:
+            raise FemInputError("spectral radius must lie in [0, 1]", where="transient", value=rho)
+        alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        difference = 1.0 - alpha_m + alpha_f
+        return Scheme(alpha_m, alpha_f, 0.25 * difference**2, 0.5 - alpha_m + alpha_f)
+
+    def discrete_frequency(self, omega: float, step: float) -> float:
+        """Frequency in rad/s with which the scheme oscillates for an undamped mode omega at that time step."""
+        w = (omega * step) ** 2
+        am, af, b, g = self.alpha_m, self.alpha_f, self.beta, self.gamma
+        # State (u, h v, h^2 a): left @ new = right @ old.
+        left = np.array([[(1.0 - af) * w, 0.0, 1.0 - am], [1.0, 0.0, -b], [0.0, 1.0, -g]])
+        right = np.array([[-af * w, 0.0, -am], [1.0, 1.0, 0.5 - b], [0.0, 1.0, 1.0 - g]])
+        values = np.linalg.eigvals(np.linalg.solve(left, right))
+        return float(np.abs(np.angle(values[np.abs(values.imag).argmax()])) / step)
+
+
+@dataclass(frozen=True)
+class TransientSettings:
+    """How to march.
+
+    Attributes
+    ----------
+    time_step : s.
+    spectral_radius : of generalised-alpha at infinite frequency.
+    tolerance : residual relative to ``force_scale`` at which a step counts as solved.
+    max_iterations : per step; more raise.
+    depth : pairs kept by Anderson acceleration.
+    dispersion_correction : give the first modes ``corrected_modes`` the inertia with which the scheme oscillates at their
+        true frequency; the error in their frequency is then of fourth instead of second order in the step.
+    corrected_modes : how many.
+    solver : linear solver by name.
+    """
+
+    time_step: float
+    spectral_radius: float = 0.9
+    tolerance: float = 1e-4
+    max_iterations: int = 60
+    depth: int = 8
+    dispersion_correction: bool = True
+    corrected_modes: int = 2
+    solver: str = "auto"
+
+
+@dataclass(frozen=True)
+class MotionState:
+    """All that a restart needs; fields (n_dof, n_case) in SI units, u from the undeformed mesh.
+
+    ``force`` is the internal plus contact force at u; ``inertia_a``, ``damping_a``, ``inertia_v``, ``damping_v`` are M a, C a,
+    M v, C v; ``slip`` (n_point, 2, n_case); ``history`` the last displacements (n_kept, n_dof, n_case), newest first;
+    ``work`` (3, n_case) J: friction, damping and external work so far.
+    """
+
+    step: int
+    u: FloatArray
+    v: FloatArray
+    a: FloatArray
+    force: FloatArray
+    inertia_a: FloatArray
+    damping_a: FloatArray
+    inertia_v: FloatArray
+    damping_v: FloatArray
+    slip: FloatArray
+    history: FloatArray
+    work: FloatArray
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What one step yields: the new state, its contact, energies (3, n_case) J and iterations (n_case,).
+
+    ``energies`` are kinetic, strain and contact. ``net_force`` (n_dof, n_case) = p - f - C v at the end of the step: the
+    inertia force of the semi-discrete system there (the a of the scheme itself lags by (am - af) h).
+    """
+
+    state: MotionState
+    contact: ContactState
+    energies: FloatArray
+    net_force: FloatArray
+    iterations: IntArray
+
+
+class Transient:
+    """A model, its equilibrium and damping, ready to march from any motion.
+
+    Parameters
+    ----------
+    force_scale : N, to which residuals are compared: peak inertia force of the intended motion.
+    base_acceleration : t -> (n_case,) m/s^2 along ``base_direction``, or None.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        equilibrium: StaticState,
+        modes: ModalBasis,
+        damping: Rayleigh,
+        settings: TransientSettings,
+        *,
+        force_scale: float,
+        base_acceleration: Excitation | None = None,
+        base_direction: str = "y",
+    ) -> None:
+        self.model, self.equilibrium, self.settings = model, equilibrium, settings
+        self.scheme = Scheme.from_radius(settings.spectral_radius)
+        self._scale = force_scale
+        self._base = base_acceleration
+        self._inertia_load = -(model.mass @ model.direction(base_direction))
+        self._mask = model.free[:, None].astype(float)
+        h, s = settings.time_step, self.scheme
+        damping_matrix = damping.alpha * model.mass + damping.beta * modes.stiffness
+        # Mass and damping act on a_(n+1) through one matrix; so do the linear bodies.
+        linear = (1.0 - s.alpha_m) * model.mass + (1.0 - s.alpha_f) * h * s.gamma * damping_matrix
+        self._mass = SparseProduct(model.mass)
+        self._damping = SparseProduct(damping_matrix)
+        self._linear = SparseProduct(linear)
+        contact = model.contact.stick_tangent(equilibrium.contact.status[:, 0])
+        matrix = linear + (1.0 - s.alpha_f) * h * h * s.beta * (modes.stiffness + contact)
+        self._solver = self._factor(model.constrain(matrix))
+        self._gap = SparseProduct(model.contact.operator)
+        self._pull = SparseProduct(model.contact.operator.T.tocsr())
+        self._correction = self._modal_inertia(modes)
+        self._rotation = NodalRotation(model)
+
+    def _factor(self, matrix: sp.csr_matrix) -> LinearSolver:
+        solver = make_solver(self.settings.solver, symmetric=True, single=True)
+        solver.analyse(matrix)
+        solver.factor(matrix)
+        return solver
+
+    def _modal_inertia(self, modes: ModalBasis) -> tuple[FloatArray, FloatArray]:
+        """Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,)."""
+        count = self.settings.corrected_modes if self.settings.dispersion_correction else 0
+        h = self.settings.time_step
+        ratios = []
+        for omega in modes.omega[:count]:
+            if omega * h > 1.0:
+                advice = "use a smaller time step or correct fewer modes"
+                raise FemInputError("time step too large for the mode", where="transient", value=omega * h, advice=advice)
+
+            def miss(x: float, omega: float = omega) -> float:
+                return self.scheme.discrete_frequency(x, h) - omega
+
+            ratios.append((omega / brentq(miss, 0.5 * omega, 2.0 * omega, xtol=1e-14 * omega)) ** 2 - 1.0)
+        return modes.left[:, :count], np.array(ratios)
+
+    def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
+        """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case).
+
+        The slip history is that of the equilibrium; the acceleration solves M a = p - f - C v.
+        """
+        n_case = displacement.shape[1]
+        u = self.equilibrium.u[:, None] + displacement * self._mask
+        v = velocity * self._mask
+        if slip is None:
+            slip = np.repeat(self.equilibrium.contact.slip, n_case, axis=2)
+        contact = self.model.contact.evaluate(self._gap(u), slip)
+        force = self._force(u, contact)[0]
+        damping_v = self._damping(v)
+        net = (self._load(0.0, n_case) - force - damping_v) * self._mask
+        solver = make_solver(self.settings.solver, symmetric=True)
+        mass = self.model.constrain(self.model.mass)
+        solver.analyse(mass)
+        solver.factor(mass)
+        a = solver.solve(net)
+        products = (self._mass(a), self._damping(a), self._mass(v), damping_v)
+        return MotionState(0, u, v, a, force, *products, contact.slip, u[None].copy(), np.zeros((3, n_case)))
+
+    def observe(self, state: MotionState) -> StepRecord:
+        """The record of a state that no step led to (t = 0)."""
+        contact = self.model.contact.evaluate(self._gap(state.u), state.slip)
+        n_case = state.u.shape[1]
+        force, strain = self._force(state.u, contact)
+        net = (self._load(state.step * self.settings.time_step, n_case) - force - state.damping_v) * self._mask
+        return StepRecord(state, contact, self._energies(state, strain, contact), net, np.zeros(n_case, dtype=np.int64))
+
+    def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
+        """Yield ``n_step`` steps from ``state``.
+
+        A step that does not converge raises ``FemConvergenceError`` with its residual history; what was yielded is good.
+        """
+        anderson = Anderson(self.model.n_dof, state.u.shape[1], self.settings.depth)
+        for _ in range(n_step):
+            record = self._advance(state, anderson)
+            state = record.state
+            yield record
+
+    def _advance(self, old: MotionState, anderson: Anderson) -> StepRecord:
+        h, s = self.settings.time_step, self.scheme
+        n_case = old.u.shape[1]
+        u0 = old.u + h * old.v + h * h * (0.5 - s.beta) * old.a
+        p_old, p_new = self._load(old.step * h, n_case), self._load((old.step + 1) * h, n_case)
+        damping_v0 = old.damping_v + h * (1.0 - s.gamma) * old.damping_a
+        constant = (
+            s.alpha_m * (old.inertia_a + self._correct_inertia(old.a))
+            + (1.0 - s.alpha_f) * damping_v0
+            + s.alpha_f * old.damping_v
+            + s.alpha_f * (old.force - p_old)
+            - (1.0 - s.alpha_f) * p_new
+        )
+        a, force, strain, contact, iterations = self._correct(u0, constant, old, anderson)
+        inertia_a, damping_a = self._mass(a), self._damping(a)
+        new = MotionState(
+            step=old.step + 1,
+            u=u0 + h * h * s.beta * a,
+            v=old.v + h * ((1.0 - s.gamma) * old.a + s.gamma * a),
+            a=a,
+            force=force,
+            inertia_a=inertia_a,
+            damping_a=damping_a,
+            inertia_v=old.inertia_v + h * ((1.0 - s.gamma) * old.inertia_a + s.gamma * inertia_a),
+            damping_v=damping_v0 + h * s.gamma * damping_a,
+            slip=contact.slip,
+            history=old.history,
+            work=old.work,
+        )
+        new = replace(
+            new,
+            history=np.concatenate([new.u[None], old.history[:2]]),
+            work=old.work + self._increment(old, new, contact, p_old, p_new),
+        )
+        net = (p_new - force - new.damping_v) * self._mask
+        return StepRecord(new, contact, self._energies(new, strain, contact), net, iterations)
+
+    def _correct(
+        self, u0: FloatArray, constant: FloatArray, old: MotionState, anderson: Anderson
+    ) -> tuple[FloatArray, FloatArray, FloatArray, ContactState, IntArray]:
+        """Anderson-accelerated iteration on r(a) = L a + (1-af) f(u0 + b h^2 a) + constant = 0."""
+        h, s = self.settings.time_step, self.scheme
+        a = (_extrapolate(old.history, old.v * h) - u0) / (h * h * s.beta)
+        iterations = np.zeros(a.shape[1], dtype=np.int64)
+        step = previous = None
+        w = self._rotation(u0 + h * h * s.beta * a - self.equilibrium.u[:, None])
+        history: list[float] = []
+        for _ in range(self.settings.max_iterations):
+            u = u0 + h * h * s.beta * a
+            contact = self.model.contact.evaluate(self._gap(u), old.slip)
+            force, strain = self._force(u, contact)
+            inertia = self._linear(a) + (1.0 - s.alpha_m) * self._correct_inertia(a)
+            residual = (inertia + (1.0 - s.alpha_f) * force + constant) * self._mask
+            size = np.sqrt(np.einsum("nc,nc->c", residual, residual)) / self._scale
+            history.append(float(size.max()))
+            active = ~(size <= self.settings.tolerance)
+            if not active.any():
+                return a, force, strain, contact, iterations
+            if not np.isfinite(history[-1]):
+                break
+            correction = -rotate(w, 1.0, self._solver.solve(rotate(w, -1.0, residual))) * self._mask
+            if step is not None and previous is not None:
+                anderson.remember(active, step, correction - previous)
+            step = anderson.step(active, correction)
+            previous = correction
+            a = a + step
+            iterations += active
+        raise FemConvergenceError(
+            "time step does not converge",
+            where=f"step {old.step + 1}",
+            value=f"relative residual {history[-1]:.2e}",
+            advice="use a smaller time step or a softer penalty",
+            history=tuple(history),
+        )
+
+    def _correct_inertia(self, a: FloatArray) -> FloatArray:
+        """The low-rank inertia of the dispersion correction, sum_j M phi_j r_j phi_j' M a."""
+        left, ratio = self._correction
+        return np.asarray(left @ (ratio[:, None] * (left.T @ a)))
+
+    def _force(self, u: FloatArray, contact: ContactState) -> tuple[FloatArray, FloatArray]:
+        force, strain = self.model.elastic_force(u)
+        weighted = np.repeat(self.model.contact.area, 3)[:, None] * contact.traction
+        return force + self._pull(weighted), strain
+
+    def _load(self, t: float, n_case: int) -> FloatArray:
+        load = np.repeat(self.model.load[:, None], n_case, axis=1)
+        return load if self._base is None else load + np.outer(self._inertia_load, self._base(t))
+
+    def _energies(self, state: MotionState, strain: FloatArray, contact: ContactState) -> FloatArray:
+        kinetic = 0.5 * np.einsum("nc,nc->c", state.v, state.inertia_v)
+        return np.stack([kinetic, strain, self.model.contact.stored_energy(contact.traction)])
+
+    def _increment(
+        self, old: MotionState, new: MotionState, contact: ContactState, p_old: FloatArray, p_new: FloatArray
+    ) -> FloatArray:
+        """Friction, damping and external work of one step, (3, n_case) J; the last two by the trapezoidal rule."""
+        power = np.einsum("nc,nc->c", old.v, old.damping_v) + np.einsum("nc,nc->c", new.v, new.damping_v)
+        friction = self.model.contact.dissipated(contact.traction, old.slip, contact.slip)
+        external = np.einsum("nc,nc->c", 0.5 * (p_old + p_new), new.u - old.u)
+        return np.stack([friction, 0.5 * self.settings.time_step * power, external])
+
+
+def _extrapolate(history: FloatArray, shift: FloatArray) -> FloatArray:
+    """Next displacement from the parabola through the last ones, newest first; at the start u + h v."""
+    if len(history) == 1:
+        return np.asarray(history[0] + shift)
+    if len(history) == 2:
+        return np.asarray(2.0 * history[0] - history[1])
+    return np.asarray(3.0 * history[0] - 3.0 * history[1] + history[2])
+
+
+def with_tolerance(settings: TransientSettings, tolerance: float) -> TransientSettings:
+    """The same settings at another residual tolerance."""
+    return replace(settings, tolerance=tolerance)
