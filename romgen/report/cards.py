@@ -48,6 +48,17 @@ def preload_card(inputs: ReportInputs) -> list[Card]:
     return [Card("Clamping force error", f"{worst:.2g}", "%", f"limit {limit:g} %, worst interface", worst <= limit)]
 
 
+def fmu_card(inputs: ReportInputs) -> list[Card]:
+    """Agreement of the native unit with the Python model."""
+    check, limit = inputs.fmu_check, inputs.limits.fmu_relative
+    if check is None:
+        return []
+    problems = len(check.fmpy_problems)
+    note = f"limit {limit:.0e} relative; fmpy reports {problems or 'no'} problem{'s' if problems > 1 else ''}"
+    passed = bool(check.native_vs_python_rel <= limit and not problems)
+    return [Card("FMU against Python", f"{check.native_vs_python_rel:.1e}", "", note, passed)]
+
+
 def time_card(inputs: ReportInputs) -> list[Card]:
     """Wall time of all stages and the largest memory."""
     if not inputs.stages:
@@ -59,5 +70,5 @@ def time_card(inputs: ReportInputs) -> list[Card]:
 
 def cards(inputs: ReportInputs) -> tuple[Card, ...]:
     """All headline numbers that this study has."""
-    builders = (frequency_cards, nmte_card, preload_card, time_card)
+    builders = (frequency_cards, nmte_card, preload_card, fmu_card, time_card)
     return tuple(card for build in builders for card in build(inputs))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from romgen.arrays import FloatArray
+from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.provenance import Provenance
 from romgen.reduced_model import ReducedModel
 from romgen.structure import Modes, Preload, RingDown, Structure
 from romgen.trajectory import Trajectory
@@ -76,9 +77,10 @@ class ReportInputs:
     ring_downs : the computed transients with their energies.
     reconstructions : recorded motions against the reduced model.
     model : the reduced model.
+    fmu_export, fmu_check : the exported unit and how well it repeats the Python model.
     stages : cost of each stage, in running order.
     warnings : one line per thing a reader must know.
-    provenance : name -> value of versions, hashes, seeds and machine.
+    provenance : versions, hashes and machine.
     command : the line that makes this report again.
     limits : what the headline numbers are judged by.
     """
@@ -91,8 +93,10 @@ class ReportInputs:
     ring_downs: tuple[RingDown, ...] = ()
     reconstructions: tuple[Reconstruction, ...] = ()
     model: ReducedModel | None = None
+    fmu_export: FmuExport | None = None
+    fmu_check: FmuCheck | None = None
     stages: tuple[StageCost, ...] = ()
     warnings: tuple[str, ...] = ()
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    provenance: Provenance | None = None
     command: str = "romgen run study.toml"
     limits: Limits = field(default_factory=Limits)

@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from romgen.provenance import Provenance
 from romgen.report.blocks import Block, ListingBlock, Section, TableBlock, TextBlock
 from romgen.report.contact_figures import contact_figure, convergence_figure, resultant_table
 from romgen.report.cost_figures import cost_figure, cost_table
+from romgen.report.fmu_tables import check_table, export_table, problem_listing
 from romgen.report.inputs import ReportInputs
 from romgen.report.mode_tables import frequency_table, ratio_table
 from romgen.report.ringdown_figures import energy_figure, energy_table, nmte_table, ringdown_figure
@@ -91,6 +93,17 @@ def spectrogram_section(inputs: ReportInputs) -> Section | None:
     return Section("spectrogram", "Spectrogram", figures)
 
 
+def fmu_section(inputs: ReportInputs) -> Section | None:
+    """The exported unit and its checks."""
+    export, check = inputs.fmu_export, inputs.fmu_check
+    exported: tuple[Block, ...] = () if export is None else (export_table(export),)
+    checked: tuple[Block, ...] = ()
+    if check is not None:
+        checked = (check_table(check, inputs.limits.fmu_relative), problem_listing(check))
+    blocks = (*exported, *checked)
+    return Section("fmu", "Exported FMU", blocks) if blocks else None
+
+
 def cost_section(inputs: ReportInputs) -> Section | None:
     """Time and memory."""
     if not inputs.stages:
@@ -100,10 +113,25 @@ def cost_section(inputs: ReportInputs) -> Section | None:
 
 def provenance_section(inputs: ReportInputs) -> Section | None:
     """How to make the numbers again and what they were made with."""
-    rows = tuple(inputs.provenance.items())
-    table: tuple[Block, ...] = (TableBlock("Versions, hashes and machine of this run.", ("what", "value"), rows, True),)
     command = ListingBlock("The command that makes this report again.", inputs.command)
-    return Section("provenance", "Provenance and reproduction", (command, *(table if rows else ())))
+    tables: tuple[Block, ...] = () if inputs.provenance is None else (provenance_table(inputs.provenance),)
+    return Section("provenance", "Provenance and reproduction", (command, *tables))
+
+
+def provenance_table(provenance: Provenance) -> TableBlock:
+    """Versions, hashes, threads and machine."""
+    rows = (
+        ("created", provenance.created),
+        ("romgen", provenance.romgen_version),
+        ("source commit", provenance.git_commit or "installed package"),
+        ("study sha256", provenance.study_sha256),
+        ("Python", provenance.python),
+        ("system", f"{provenance.system}, {provenance.machine}, {provenance.cpu_count} processors"),
+        ("threads of compiled kernels", f"{provenance.numba_threads}"),
+        *provenance.environment.items(),
+        *provenance.packages.items(),
+    )
+    return TableBlock("Versions, hashes and machine of this run.", ("what", "value"), rows, True)
 
 
 BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
@@ -114,6 +142,7 @@ BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
     ringdown_section,
     spectrogram_section,
     energy_section,
+    fmu_section,
     cost_section,
     provenance_section,
 )

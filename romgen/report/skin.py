@@ -1,18 +1,24 @@
-"""Pictures of the outer surface: polygons of the skin, projected, shaded and painted from back to front."""
+"""Pictures of the outer surface of a structure: projection, colours, light, mesh lines."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 
-from romgen.arrays import FloatArray, IntArray
+from romgen.arrays import BoolArray, FloatArray, IntArray
+from romgen.report.raster import Raster, rasterise
 from romgen.structure import Structure
 
-# Corner pairs of the edges of a hexahedron, VTK order.
+# Corner pairs of the element edges, VTK order.
 _HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-_AZIMUTH, _ELEVATION = np.radians(-58.0), np.radians(27.0)
+_TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+_AZIMUTH, _ELEVATION = np.radians(-58.0), np.radians(36.0)
 _LIGHT = np.array([-0.35, -0.45, 0.82])
+_LINE_PX, _LINE_DARKNESS = 1.3, 0.35
+
+Colouring = Callable[[Raster], FloatArray]
 
 
 def _edge_keys(first: IntArray, second: IntArray, n_node: int) -> IntArray:
@@ -21,31 +27,20 @@ def _edge_keys(first: IntArray, second: IntArray, n_node: int) -> IntArray:
     return keys
 
 
-def skin_faces(structure: Structure) -> IntArray:
-    """The faces of the skin: triangles for tets, quadrilaterals for hexes (pairs of triangles rejoined).
-
-    Returns
-    -------
-    (n_face, 3) or (n_face, 4) corner nodes in cyclic order.
-    """
-    triangles, n_node = structure.skin, structure.points.shape[0]
-    if structure.cell_type == "tet10":
-        return triangles
-    pairs = np.array(_HEX_EDGES)
+def mesh_edges(structure: Structure) -> BoolArray:
+    """(n_triangle, 3) whether the edge opposite each corner of a skin triangle is an element edge, not a diagonal."""
+    n_node = structure.points.shape[0]
+    pairs = np.array(_TET_EDGES if structure.cell_type == "tet10" else _HEX_EDGES)
     in_cells = _edge_keys(structure.cells[:, pairs[:, 0]], structure.cells[:, pairs[:, 1]], n_node)
-    keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1), n_node)
-    diagonal = np.argmin(np.isin(keys, in_cells), axis=1)  # the one edge of each triangle that no cell has
-    order = np.argsort(keys[np.arange(len(triangles)), diagonal], kind="stable")
-    first, second = order[0::2], order[1::2]
-    apex = triangles[second, (diagonal[second] + 2) % 3]
-    a, b, c = (triangles[first, (diagonal[first] + k) % 3] for k in range(3))
-    return np.column_stack([a, apex, b, c])
+    following, last = np.roll(structure.skin, -1, axis=1), np.roll(structure.skin, -2, axis=1)
+    return np.isin(_edge_keys(following, last, n_node), in_cells)
 
 
-def node_body(structure: Structure) -> IntArray:
-    """(n_node,) index of the body each node belongs to (the last one where bodies share nodes)."""
-    body = np.zeros(structure.points.shape[0], dtype=np.int64)
-    body[structure.cells] = structure.cell_body[:, None]
+def triangle_body(structure: Structure) -> IntArray:
+    """(n_triangle,) body of each skin triangle: the one that holds all its corners."""
+    holds = np.zeros((structure.points.shape[0], len(structure.bodies)), dtype=bool)
+    holds[structure.cells, structure.cell_body[:, None]] = True
+    body: IntArray = np.argmax(holds[structure.skin].all(axis=1), axis=1).astype(np.int64)
     return body
 
 
@@ -58,39 +53,40 @@ def view_frame() -> FloatArray:
     return np.array([right, up, towards])
 
 
-def _shading(polygons: FloatArray) -> FloatArray:
-    """(n_face,) brightness; thin sheets are seen from both sides, so the sign of the normal does not count."""
-    normals = np.cross(polygons[:, 1] - polygons[:, 0], polygons[:, 2] - polygons[:, 0])
-    length = np.linalg.norm(normals, axis=1)
-    shade: FloatArray = 0.68 + 0.32 * np.abs(normals @ _LIGHT) / np.maximum(length, np.finfo(float).tiny)
-    return np.minimum(shade, 1.0)
+def _brightness(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """(n_triangle,) of light; thin sheets are seen from both sides, so the sign of the normal does not count."""
+    corners = points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
+    brightness: FloatArray = np.minimum(0.7 + 0.3 * np.abs(normals @ _LIGHT) / length, 1.0)
+    return brightness
 
 
-def draw_faces(axes: Axes, points: FloatArray, faces: IntArray, colours: FloatArray) -> None:
-    """Draw the skin in parallel projection, true to scale, far faces first.
+def draw_skin(axes: Axes, structure: Structure, points: FloatArray, colouring: Colouring, width_px: int) -> None:
+    """Draw the skin in parallel projection, true to scale, with light and mesh lines.
 
     Parameters
     ----------
     axes : empty axes; they lose their frame.
+    structure : the mesh.
     points : (n_node, 3) m, as drawn (deformed).
-    faces : (n_face, 3 or 4) corner nodes.
-    colours : (n_face, 4) RGBA.
+    colouring : colour of every pixel, (n_row, n_column, 3), from what it sees.
+    width_px : columns of the picture.
     """
-    seen = points[faces] @ view_frame().T
-    order = np.argsort(seen[:, :, 2].mean(axis=1))
-    shaded = np.column_stack([colours[:, :3] * _shading(points[faces])[:, None], np.ones(len(faces))])
-    outlines = list(seen[order][:, :, :2])
-    axes.add_collection(PolyCollection(outlines, facecolors=shaded[order], edgecolors="#0000003c", linewidths=0.3))
-    axes.autoscale_view()
-    axes.margins(0.02)
-    axes.set_aspect("equal")
+    raster = rasterise(points @ view_frame().T, structure.skin, mesh_edges(structure), width_px)
+    light = _brightness(points, structure.skin)[raster.triangle]
+    line = 1.0 - _LINE_DARKNESS * np.clip(1.5 * _LINE_PX - raster.edge_px, 0.0, 1.0)
+    colours = colouring(raster) * (light * line)[:, :, None]
+    opaque = (raster.triangle >= 0).astype(float)
+    picture = np.dstack([np.clip(colours, 0.0, 1.0), opaque])
+    axes.imshow(picture, origin="lower", extent=raster.extent, interpolation="antialiased", interpolation_stage="rgba")
     axes.set_axis_off()
 
 
 def draw_triad(axes: Axes, length: float) -> None:
     """Arrows x, y, z of the given length in m at the lower left corner of the picture."""
     right, up, _ = view_frame()
-    x, y = axes.get_xlim()[0] + 0.3 * length, axes.get_ylim()[0] + 0.6 * length
+    x, y = axes.get_xlim()[0] + 0.3 * length, axes.get_ylim()[0] + 0.3 * length
     for k, name in enumerate("xyz"):
         dx, dy = length * right[k], length * up[k]
         axes.annotate("", (x + dx, y + dy), (x, y), arrowprops={"arrowstyle": "->", "color": "#30343B"})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -11,13 +13,16 @@ from matplotlib.patches import Patch
 from romgen.arrays import FloatArray, IntArray
 from romgen.report.blocks import FigureBlock
 from romgen.report.curve_table import CurveTable, curve_table
-from romgen.report.skin import draw_faces, draw_triad, node_body, skin_faces, view_frame
+from romgen.report.raster import Raster
+from romgen.report.skin import draw_skin, draw_triad, triangle_body, view_frame
 from romgen.report.style import DIVERGING, FULL_WIDTH_IN, new_figure
 from romgen.structure import Modes, Structure
 
 # Soft tints, one per body, in the order blue, amber, green, pink, grey.
 _BODY_COLOURS = ("#8DBBE0", "#F3CB7D", "#8BCDB5", "#E2B4CE", "#C3C8D0")
 SHOWN_MODES = 4
+_WIDTH_PX = 1400
+_UNIT_RANGE = Normalize(-1.0, 1.0)
 # Largest drawn modal displacement as a fraction of the model's length.
 _DRAWN_AMPLITUDE = 0.12
 
@@ -31,16 +36,17 @@ def _picture_height_in(points: FloatArray, width_in: float) -> float:
 
 def mesh_figure(structure: Structure) -> FigureBlock:
     """The mesh, one colour per body."""
-    faces = skin_faces(structure)
     figure = new_figure(_picture_height_in(structure.points, FULL_WIDTH_IN) + 0.4)
     axes = figure.add_subplot()
-    body = node_body(structure)[faces].min(axis=1)
+    body = triangle_body(structure)
     palette = np.array([to_rgba(_BODY_COLOURS[k % len(_BODY_COLOURS)]) for k in range(len(structure.bodies))])
-    draw_faces(axes, structure.points, faces, palette[body])
+    draw_skin(
+        axes, structure, structure.points, lambda raster: palette[body[raster.triangle], :3], int(1.5 * _WIDTH_PX)
+    )
     draw_triad(axes, 0.1 * np.ptp(structure.points, axis=0).max())
     handles = [Patch(facecolor=tuple(palette[k]), label=name) for k, name in enumerate(structure.bodies)]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
-    nodes = np.unique(faces)
+    nodes = np.unique(structure.skin)
     p = structure.points[nodes]
     columns = [(name, "m", p[:, k]) for k, name in enumerate("xyz")]
     caption = (
@@ -64,29 +70,39 @@ def transverse_direction(modes: Modes) -> int:
     return int(np.argmax(np.einsum("ndm,ndm->d", shapes, shapes)))
 
 
+def _field_colouring(structure: Structure, nodal: FloatArray) -> Callable[[Raster], FloatArray]:
+    """Colours of a field given at the nodes, (n_node,) in -1..1, linear over each triangle."""
+
+    def colours(raster: Raster) -> FloatArray:
+        values = np.einsum("rck,rck->rc", raster.weights, nodal[structure.skin[raster.triangle]])
+        coloured: FloatArray = matplotlib.colormaps[DIVERGING](_UNIT_RANGE(values))[:, :, :3]
+        return coloured
+
+    return colours
+
+
 def mode_figure(structure: Structure, modes: Modes) -> FigureBlock:
     """The first modes on the deformed skin, coloured by the transverse displacement."""
     shapes = [unit_shape(modes, k) for k in range(min(SHOWN_MODES, modes.frequency_hz.size))]
     size = _DRAWN_AMPLITUDE * np.ptp(structure.points, axis=0).max()
     deformed = [structure.points + size * shape for shape in shapes]
-    rows, faces, direction = (len(shapes) + 1) // 2, skin_faces(structure), transverse_direction(modes)
+    rows, direction = (len(shapes) + 1) // 2, transverse_direction(modes)
     height = max(_picture_height_in(points, 0.46 * FULL_WIDTH_IN) for points in deformed)
     figure = new_figure(rows * (height + 0.25))
     grid = figure.subplots(rows, 2, squeeze=False)
-    norm, colour_map = Normalize(-1.0, 1.0), matplotlib.colormaps[DIVERGING]
     for k, (axes, points, shape) in enumerate(zip(grid.flat, deformed, shapes, strict=False)):
-        draw_faces(axes, points, faces, colour_map(norm(shape[faces, direction].mean(axis=1))))
+        draw_skin(axes, structure, points, _field_colouring(structure, shape[:, direction]), _WIDTH_PX)
         axes.set_title(f"mode {k + 1}: {modes.frequency_hz[k]:.2f} Hz")
     for axes in grid.flat[len(shapes) :]:
         axes.set_axis_off()
-    bar = figure.colorbar(ScalarMappable(norm, colour_map), ax=grid, shrink=0.7, aspect=28, location="right")
+    bar = figure.colorbar(ScalarMappable(_UNIT_RANGE, DIVERGING), ax=grid, shrink=0.7, aspect=28, location="right")
     bar.set_label(f"{'xyz'[direction]} displacement / largest [1]")
     caption = (
         f"Mode shapes of the preloaded structure with stuck contact on the deformed skin; colour is the "
         f"{'xyz'[direction]} displacement. Each shape is drawn with its largest displacement at "
         f"{100 * _DRAWN_AMPLITUDE:.0f} % of the model length; the sign of a mode is arbitrary."
     )
-    return FigureBlock("modes", figure, caption, (_mode_table(np.unique(faces), shapes),), "png")
+    return FigureBlock("modes", figure, caption, (_mode_table(np.unique(structure.skin), shapes),), "png")
 
 
 def _mode_table(nodes: IntArray, shapes: list[FloatArray]) -> CurveTable:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
+from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.polynomial import PolynomialMap
+from romgen.provenance import collect_provenance
 from romgen.reduced_model import ReducedModel
 from romgen.report import Reconstruction, ReportInputs, StageCost
 from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, Structure
@@ -191,8 +193,10 @@ def full_inputs(
         ring_downs,
         reconstructions,
         model,
+        FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),
+        FmuCheck((), 3.1e-12, 1e-12, 2e-12, 3.1e-12, (), 4e-10, 1e-4, 2000),
         stages,
         ("validation motion 'mixed' starts outside the trained range of mode 2",),
-        {"romgen": "0.1.0", "study hash": "0123456789abcdef"},
+        collect_provenance("0123456789abcdef", "{}"),
         "romgen run models/clamped_arch/study.toml",
     )

@@ -1,0 +1,47 @@
+"""The exported unit and its checks as tables."""
+
+from __future__ import annotations
+
+from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.report.blocks import ListingBlock, TableBlock
+
+
+def export_table(export: FmuExport) -> TableBlock:
+    """What was written."""
+    rows = (
+        ("file", export.path),
+        ("size", f"{export.size_bytes:,} bytes"),
+        ("platforms", ", ".join(export.platforms) or "none, source code only"),
+        ("compiler", export.compiler),
+        ("guid", export.guid),
+        ("sha256", export.sha256),
+        *(("note", note) for note in export.notes),
+    )
+    return TableBlock("The exported unit, FMI 2.0.", ("what", "value"), rows, True)
+
+
+def check_table(check: FmuCheck, limit: float) -> TableBlock:
+    """Agreement of the units with the Python model under the same input treatment, each against its limit."""
+    runs = [
+        ("native, free decay", "none", check.native_free_rel, limit),
+        ("native, forced", "held constant within each step", check.native_held_rel, limit),
+        ("native, forced", "linear within each step (input derivative)", check.native_linear_rel, limit),
+    ]
+    rows = [(*run[:2], f"{run[2]:.2e}", f"{run[3]:.0e}", "met" if run[2] <= run[3] else "not met") for run in runs]
+    if check.pythonfmu_vs_python_rel is not None:
+        rows.append(
+            ("pythonfmu", "free, and held constant", f"{check.pythonfmu_vs_python_rel:.2e}", "no limit", "cross-check")
+        )
+    caption = (
+        "Units simulated by fmpy against the Python model with the same input treatment: largest difference over "
+        f"largest magnitude of states, displacements and velocities over {check.n_step} steps of {check.step_size:g} s."
+    )
+    return TableBlock(caption, ("run", "input", "difference [1]", "limit [1]", "verdict"), tuple(rows), True)
+
+
+def problem_listing(check: FmuCheck) -> ListingBlock:
+    """What the validator of fmpy says about both units."""
+    lines = [f"native: {problem}" for problem in check.fmpy_problems] or ["native: no problem"]
+    if check.pythonfmu_vs_python_rel is not None:
+        lines += [f"pythonfmu: {problem}" for problem in check.pythonfmu_problems] or ["pythonfmu: no problem"]
+    return ListingBlock("What fmpy's validator says.", "\n".join(lines))
