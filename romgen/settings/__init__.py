@@ -18,11 +18,18 @@ from romgen.settings.finite_elements import (
     RingDownStart,
     SensorSettings,
 )
-from romgen.settings.learning import FmuSettings, ForcedResponseSettings, LearnSettings, ReportSettings
+from romgen.settings.learning import (
+    AcceptanceSettings,
+    FmuSettings,
+    ForcedResponseSettings,
+    LearnSettings,
+    ReportSettings,
+)
 from romgen.settings.load import StudyError, load_study
 from romgen.settings.study import Study, StudySettings
 
 __all__ = [
+    "AcceptanceSettings",
     "ArchSettings",
     "BaseAccelerationSettings",
     "BlockSettings",

@@ -1,4 +1,4 @@
-"""Tables from learning to the report: [learn], [forced_response], [fmu], [report]."""
+"""Tables from learning to the report: [learn], [forced_response], [fmu], [report], [acceptance]."""
 
 from __future__ import annotations
 
@@ -44,3 +44,11 @@ class ReportSettings(Settings):
 
     title: str | None = None
     vtu: bool = True
+
+
+class AcceptanceSettings(Settings):
+    """Table [acceptance]: limits that `romgen validate` enforces (exit code 4) and the report states."""
+
+    nmte_percent: float = Field(default=10.0, gt=0.0)
+    fmu_relative: float = Field(default=1e-9, gt=0.0)
+    preload_percent: float = Field(default=0.1, gt=0.0)

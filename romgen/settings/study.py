@@ -20,7 +20,13 @@ from romgen.settings.finite_elements import (
     RingDownSettings,
     SensorSettings,
 )
-from romgen.settings.learning import FmuSettings, ForcedResponseSettings, LearnSettings, ReportSettings
+from romgen.settings.learning import (
+    AcceptanceSettings,
+    FmuSettings,
+    ForcedResponseSettings,
+    LearnSettings,
+    ReportSettings,
+)
 
 
 class StudySettings(Settings):
@@ -49,6 +55,7 @@ class Study(Settings):
     forced_response: ForcedResponseSettings = ForcedResponseSettings()
     fmu: FmuSettings = FmuSettings()
     report: ReportSettings = ReportSettings()
+    acceptance: AcceptanceSettings = AcceptanceSettings()
 
     @model_validator(mode="after")
     def _model_or_data(self) -> Self:

@@ -1,0 +1,5 @@
+"""``python -m romgen`` is the command ``romgen``."""
+
+from romgen.cli.app import main
+
+main()

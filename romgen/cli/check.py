@@ -1,0 +1,44 @@
+"""romgen check: everything that can be wrong with a study, before anything is computed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from romgen.cli.failures import reported
+from romgen.cli.options import Json, Quiet, StudyPath, open_study
+from romgen.cli.output import Output
+from romgen.settings import Study, estimate, study_warnings
+
+
+@reported
+def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False) -> None:
+    """Check a study: keys, values, names, files, units; then estimate its memory and run time."""
+    study = open_study(study_path)
+    out = Output(quiet=quiet, as_json=json_output)
+    warnings, size = study_warnings(study), estimate(study)
+    for warning in warnings:
+        out.text(f"warning: {warning}")
+    out.text(_kind(study))
+    if size is not None:
+        memory, minutes = size.memory_bytes / 1e9, size.wall_s / 60.0
+        out.text(f"{size.dofs} displacement unknowns")
+        out.text(f"ring-downs need about {memory:.1f} GB and {minutes:.0f} min, within a factor of three")
+    out.text("no problem found")
+    sizes = None if size is None else asdict(size)
+    out.document({"study": study.name, "problems": [], "warnings": warnings, "estimate": sizes})
+
+
+def _kind(study: Study) -> str:
+    """Say in one line what the study consists of."""
+    if study.data is not None:
+        data = study.data
+        return (
+            f"{study.name}: {len(data.files)} files, {len(data.sensors)} sensors, {len(data.training)} training and "
+            f"{len(data.validation)} validation trajectories"
+        )
+    ringdowns = study.ringdowns
+    training, validation = (len(ringdowns.training), len(ringdowns.validation)) if ringdowns else (0, 0)
+    return (
+        f"{study.name}: {len(study.blocks)} blocks, {len(study.contacts)} contact pairs, {len(study.sensors)} sensors, "
+        f"{training} training and {validation} validation ring-downs"
+    )
