@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy.typing as npt
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.errors import InputError
+from romgen.etdrk4 import largest_step
 from romgen.fmu.programme import MonomialProgramme, fold_conjugates, monomial_programme
 from romgen.polynomial import Scalar
 from romgen.reduced_model import ReducedModel
@@ -20,12 +20,6 @@ HARD_LIMIT = 3.0
 
 MAX_PRODUCTS = 60000
 """Monomials are numbered by 16-bit integers in the runtime."""
-
-
-def max_internal_step(model: ReducedModel) -> float:
-    """Longest internal step h_max = min(1e-4 s, 1 / (20 f_max)), s."""
-    f_max = float(np.max(model.eigenvalues.imag)) / (2.0 * math.pi)
-    return min(1e-4, 1.0 / (20.0 * f_max))
 
 
 def coefficients_header(model: ReducedModel) -> str:
@@ -78,7 +72,7 @@ def sizes_header(model: ReducedModel, guid: str, coefficients: str) -> str:
         "N_CHART_PRODUCT": len(chart.products),
         "N_SENSOR_PRODUCT": len(_sensor_programme(model).products),
         "DEFAULT_HARD_LIMIT": _real(HARD_LIMIT),
-        "DEFAULT_MAX_INTERNAL_STEP": _real(max_internal_step(model)),
+        "DEFAULT_MAX_INTERNAL_STEP": _real(largest_step(model.eigenvalues)),
         "MODEL_IDENTIFIER": model.name,
         "MODEL_GUID": f'"{guid}"',
         "MODEL_HASH": f"UINT64_C(0x{hashlib.sha256(coefficients.encode()).hexdigest()[:16]})",

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 import romgen
-from romgen.fmu.coefficients import max_internal_step
+from romgen.etdrk4 import largest_step
 from romgen.fmu.interface import FmuInterface
 from romgen.fmu.records import FmuInfo
 from romgen.fmu.templates import render
@@ -95,6 +95,6 @@ def documentation_page(model: ReducedModel, interface: FmuInterface, info: FmuIn
         variables=interface.variables,
         hold_percent=100.0 * math.pi * f_max * 1e-5,
         f_max=f_max,
-        max_step=repr(max_internal_step(model)),
+        max_step=repr(largest_step(model.eigenvalues)),
         euler_limit=float(np.min(2.0 * zeta / omega)),
     )

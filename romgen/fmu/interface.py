@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from romgen.fmu.coefficients import HARD_LIMIT, max_internal_step
+from romgen.etdrk4 import largest_step
+from romgen.fmu.coefficients import HARD_LIMIT
 from romgen.fmu.dependencies import sensor_states, state_couplings
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
 from romgen.reduced_model import ReducedModel
@@ -199,7 +200,7 @@ def _parameters(model: ReducedModel) -> list[Variable]:
         parameter("input_gain", "factor on all inputs", "tunable", "1", 1.0),
         parameter("trust_radius", "trust_ratio above which inside_trust_region is false; positive", "tunable", "1", 1.0),
         parameter("hard_limit", "trust_ratio above which a step fails and is not taken; positive", "tunable", "1", HARD_LIMIT),
-        parameter("max_internal_step", "longest step of the integrator; positive", "fixed", "s", max_internal_step(model)),
+        parameter("max_internal_step", "longest step of the integrator; positive", "fixed", "s", largest_step(model.eigenvalues)),
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
-from romgen.polynomial import PolynomialMap, evaluate
+from romgen.polynomial import PolynomialMap, evaluate, zeta
 from romgen.reduced_model import ReducedModel
 
 N_PHASE = 32
@@ -23,7 +23,7 @@ def nominal_velocity(model: ReducedModel) -> FloatArray:
 
 def _largest(model: ReducedModel, sensors: PolynomialMap[np.float64]) -> FloatArray:
     z = _trained_circles(model)
-    y = evaluate(model.chart, np.hstack([z, z.conj()])).real
+    y = evaluate(model.chart, zeta(z)).real
     largest: FloatArray = np.max(np.abs(evaluate(sensors, y)), axis=0)
     return largest
 

@@ -1,0 +1,159 @@
+"""The door to fmpy: validation, and driving a unit for Co-Simulation step by step."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.validation import validate_fmu
+
+from romgen.arrays import ComplexArray, FloatArray
+from romgen.errors import InputError, NumericalError
+from romgen.fmu.records import FmuReplay
+
+Hold = Literal["constant", "linear"]
+
+
+@dataclass(frozen=True)
+class References:
+    """Value references of what a replay sets and reads."""
+
+    states: tuple[int, ...]
+    inputs: tuple[int, ...]
+    displacement: tuple[int, ...]
+    velocity: tuple[int, ...]
+    trust_ratio: int
+
+
+@dataclass(frozen=True)
+class Slave:
+    """An instantiated unit: fmpy's object, its references, and the messages it has logged so far."""
+
+    fmu: FMU2Slave
+    references: References
+    messages: list[str]
+
+
+def fmpy_problems(path: Path | str) -> tuple[str, ...]:
+    """What fmpy's validator finds wrong with a unit; empty for a valid one."""
+    return tuple(validate_fmu(str(path)))
+
+
+@contextmanager
+def opened_slave(path: Path | str) -> Iterator[Slave]:
+    """An instance for Co-Simulation, freed on leaving; its messages are kept instead of printed.
+
+    Raises
+    ------
+    InputError : when the unit has no binary for this machine or cannot be instantiated.
+    """
+    folder = extract(str(path))
+    try:
+        description = read_model_description(folder, validate=False)
+        messages: list[str] = []
+        callbacks = _collecting_callbacks(messages)
+        try:
+            fmu = FMU2Slave(
+                guid=description.guid,
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                unzipDirectory=folder,
+                instanceName="instance",
+            )
+            fmu.instantiate(callbacks=callbacks)
+        except Exception as error:  # fmpy raises plain Exception for a missing library and a failed instantiation
+            detail = "; ".join([str(error), *messages])
+            raise InputError("the unit cannot be instantiated", where=str(path), value=detail) from error
+        try:
+            yield Slave(fmu, _references(description.modelVariables), messages)
+        finally:
+            fmu.freeInstance()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def replay(
+    path: Path | str, t: FloatArray, z0: ComplexArray, inputs: FloatArray | None = None, *, hold: Hold = "constant"
+) -> FmuReplay:
+    """Drive a unit from a start state over given times.
+
+    Parameters
+    ----------
+    path : the unit.
+    t : (n_time,) s, increasing; the communication points.
+    z0 : (m,) start state.
+    inputs : (n_time, n_input) at the times ``t``, SI units, or None for zero.
+    hold : "constant" holds the value of the start of each step; "linear" passes its slope by fmi2SetRealInputDerivatives.
+
+    Raises
+    ------
+    InputError : when the unit cannot be used on this machine.
+    NumericalError : when it reports an error, with its messages.
+    """
+    with opened_slave(path) as slave:
+        try:
+            return _replay(slave, t, z0, inputs, hold)
+        except FMICallException as error:
+            raise NumericalError(
+                f"{error.function} failed", where=str(path), value="; ".join(slave.messages) or str(error)
+            ) from error
+
+
+def _replay(slave: Slave, t: FloatArray, z0: ComplexArray, inputs: FloatArray | None, hold: Hold) -> FmuReplay:
+    fmu, vr = slave.fmu, slave.references
+    n = len(vr.inputs)
+    u = np.zeros((len(t), n)) if inputs is None else inputs
+    if u.shape != (len(t), n) or 2 * len(z0) != len(vr.states):
+        raise InputError("the inputs or the start state do not fit the unit", where="replay", value=(u.shape, len(z0)))
+    fmu.setupExperiment(startTime=float(t[0]))
+    fmu.setReal(vr.states, np.stack([z0.real, z0.imag], axis=-1).ravel().tolist())
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    read = [*vr.states, *vr.displacement, *vr.velocity, vr.trust_ratio]
+    rows = [fmu.getReal(read)]
+    for k in range(len(t) - 1):
+        step = float(t[k + 1] - t[k])
+        if n:
+            fmu.setReal(vr.inputs, u[k].tolist())
+        if n and hold == "linear":
+            fmu.setRealInputDerivatives(vr.inputs, [1] * n, ((u[k + 1] - u[k]) / step).tolist())
+        fmu.doStep(float(t[k]), step)
+        rows.append(fmu.getReal(read))
+    fmu.terminate()
+    ends = np.cumsum([len(vr.states), len(vr.displacement), len(vr.velocity)])
+    state, displacement, velocity, trust = np.split(np.array(rows), ends, axis=1)
+    return FmuReplay(t, state, displacement, velocity, trust[:, 0])
+
+
+def _collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
+    def log(environment: int, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+        messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(log)
+    callbacks.allocateMemory = defaultCallbacks.allocateMemory
+    callbacks.freeMemory = defaultCallbacks.freeMemory
+    return callbacks
+
+
+def _references(variables: list[object]) -> References:
+    """References by role: states are what a derivative points to, sensors are outputs in m and m/s."""
+
+    def outputs(unit: str) -> tuple[int, ...]:
+        return tuple(v.valueReference for v in reals if v.causality == "output" and v.unit == unit)
+
+    reals = [v for v in variables if v.type == "Real"]
+    return References(
+        states=tuple(v.derivative.valueReference for v in reals if v.derivative is not None),
+        inputs=tuple(v.valueReference for v in reals if v.causality == "input"),
+        displacement=outputs("m"),
+        velocity=outputs("m/s"),
+        trust_ratio=next(v.valueReference for v in reals if v.name == "trust_ratio"),
+    )
