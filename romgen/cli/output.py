@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from romgen.progress import ConsoleProgress, RunProgress, SilentProgress
 
@@ -30,12 +28,14 @@ class Output:
 
     def table(self, columns: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: bool = False) -> None:
         """Print a table; with ``numbers`` all columns but the first are right-aligned."""
-        table = Table(box=None, pad_edge=False)
-        for k, column in enumerate(columns):
-            table.add_column(column, justify="right" if k and numbers else "left", no_wrap=True, overflow="ignore")
-        for row in rows:
-            table.add_row(*(Text(cell) for cell in row))
-        self.console.print(table)
+        lines = [tuple(columns), *map(tuple, rows)]
+        widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+        for line in lines:
+            cells = [
+                cell.rjust(width) if numbers and k else cell.ljust(width)
+                for k, (cell, width) in enumerate(zip(line, widths, strict=True))
+            ]
+            self.text("  ".join(cells).rstrip())
 
     def document(self, content: Any) -> None:
         """Print the JSON document of the command, when JSON is asked for."""
