@@ -6,7 +6,8 @@ import importlib.metadata
 import os
 import platform
 import subprocess
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -46,6 +47,7 @@ class Provenance:
     environment : thread variables that were set.
     study_sha256 : of the study's settings (and data files).
     study_json : all settings, defaults included.
+    seeds : of every random number that was drawn, by purpose.
     """
 
     romgen_version: str
@@ -60,9 +62,10 @@ class Provenance:
     environment: dict[str, str]
     study_sha256: str
     study_json: str
+    seeds: dict[str, int] = field(default_factory=dict)
 
 
-def collect_provenance(study_sha256: str, study_json: str) -> Provenance:
+def collect_provenance(study_sha256: str, study_json: str, seeds: Mapping[str, int]) -> Provenance:
     """Record versions, machine and threads of this process."""
     return Provenance(
         romgen_version=romgen.__version__,
@@ -77,6 +80,7 @@ def collect_provenance(study_sha256: str, study_json: str) -> Provenance:
         environment={name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ},
         study_sha256=study_sha256,
         study_json=study_json,
+        seeds=dict(seeds),
     )
 
 

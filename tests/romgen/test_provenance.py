@@ -15,7 +15,7 @@ from romgen.store import read_file, write_file
 
 def test_versions_threads_and_settings_are_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    provenance = collect_provenance("abc", "{}")
+    provenance = collect_provenance("abc", "{}", {"fmu check": 7})
     assert provenance.romgen_version == romgen.__version__
     assert provenance.packages["numpy"] == np.__version__
     assert provenance.environment["OMP_NUM_THREADS"] == "1"
