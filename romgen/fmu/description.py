@@ -6,6 +6,8 @@ import hashlib
 import math
 import os
 import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
@@ -18,10 +20,70 @@ from romgen.fmu.templates import render
 from romgen.fmu.units import unit_of
 from romgen.reduced_model import ReducedModel
 
+NATIVE_INTERFACES = {
+    "ModelExchange": {
+        "needsExecutionTool": "false",
+        "completedIntegratorStepNotNeeded": "false",
+        "canBeInstantiatedOnlyOncePerProcess": "false",
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    },
+    "CoSimulation": {
+        "needsExecutionTool": "false",
+        "canHandleVariableCommunicationStepSize": "true",
+        "canInterpolateInputs": "true",
+        "maxOutputDerivativeOrder": "1",
+        "canRunAsynchronuously": "false",
+        "canBeInstantiatedOnlyOncePerProcess": "false",
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    },
+}
+"""Capabilities of the C runtime by interface."""
+
+PYTHON_INTERFACES = {
+    "CoSimulation": {
+        "needsExecutionTool": "true",
+        "canHandleVariableCommunicationStepSize": "true",
+        "canInterpolateInputs": "false",
+        "canBeInstantiatedOnlyOncePerProcess": "false",
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "false",
+        "canSerializeFMUstate": "false",
+    },
+}
+"""Capabilities of a pythonfmu unit: it needs a Python interpreter with numpy on the target."""
+
 NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, "https://fmi-standard.org/romgen")
 
 DEFAULT_EPOCH = 315532800
 """1980-01-01, used when SOURCE_DATE_EPOCH is not set, so that the same model gives the same bytes."""
+
+
+@dataclass(frozen=True)
+class DescriptionText:
+    """The head of a description: names, texts and capabilities.
+
+    Attributes
+    ----------
+    name : model identifier.
+    tool : generation tool.
+    info : texts.
+    step_size : s, of the default experiment.
+    interfaces : attributes by interface element.
+    source_files : C files, or () without sources.
+    """
+
+    name: str
+    tool: str
+    info: FmuInfo
+    step_size: float
+    interfaces: Mapping[str, Mapping[str, str]]
+    source_files: tuple[str, ...] = ()
 
 
 def tool_name() -> str:
@@ -44,27 +106,19 @@ def content_guid(*contents: str | bytes) -> str:
     return f"{{{uuid.uuid5(NAMESPACE, digest.hexdigest())}}}"
 
 
-def model_description(
-    model: ReducedModel,
-    interface: FmuInterface,
-    info: FmuInfo,
-    *,
-    step_size: float,
-    source_files: tuple[str, ...],
-    guid: str,
-    date: str,
-) -> str:
+def model_description(text: DescriptionText, interface: FmuInterface, *, guid: str, date: str) -> str:
     """The text of modelDescription.xml."""
     names = sorted({v.unit for v in interface.variables if v.unit is not None})
     return render(
         "modelDescription.xml.j2",
-        name=model.name,
-        info=info,
+        name=text.name,
+        info=text.info,
         guid=guid,
         date=date,
-        tool=tool_name(),
-        step_size=repr(step_size),
-        source_files=source_files,
+        tool=text.tool,
+        step_size=repr(text.step_size),
+        interfaces=text.interfaces,
+        source_files=text.source_files,
         units=[unit_of(name) for name in names],
         unit_of=unit_of,
         variables=interface.variables,

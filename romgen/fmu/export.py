@@ -7,7 +7,15 @@ from pathlib import Path
 from romgen.fmu.archive import archive_bytes, write_atomically
 from romgen.fmu.build import build_binaries
 from romgen.fmu.coefficients import coefficients_header, sizes_header
-from romgen.fmu.description import content_guid, documentation_page, generation_time, model_description
+from romgen.fmu.description import (
+    NATIVE_INTERFACES,
+    DescriptionText,
+    content_guid,
+    documentation_page,
+    generation_time,
+    model_description,
+    tool_name,
+)
 from romgen.fmu.interface import build_interface
 from romgen.fmu.model_file import model_json
 from romgen.fmu.records import FmuExport, FmuInfo
@@ -68,17 +76,13 @@ def _content(model: ReducedModel, settings: FmuSettings, info: FmuInfo) -> tuple
     """Everything in the archive but the binaries, and the identifier made from it."""
     interface = build_interface(model, info.input_range)
     source_files = tuple(sorted(name for name in runtime_sources() if name.endswith(".c")))
-
-    def description(guid: str, date: str) -> str:
-        return model_description(
-            model, interface, info, step_size=settings.step_size, source_files=source_files, guid=guid, date=date
-        )
-
-    undated = description("", "")
+    text = DescriptionText(model.name, tool_name(), info, settings.step_size, NATIVE_INTERFACES, source_files)
     unnamed = generated_sources(model, "")
+    undated = model_description(text, interface, guid="", date="")
     guid = content_guid(undated, *(data for _, data in sorted(unnamed.items())))
+    description = model_description(text, interface, guid=guid, date=generation_time())
     content = {
-        "modelDescription.xml": description(guid, generation_time()).encode(),
+        "modelDescription.xml": description.encode(),
         "documentation/index.html": documentation_page(model, interface, info).encode(),
         "resources/rom.json": model_json(model).encode(),
         **licence_files(),
