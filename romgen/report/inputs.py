@@ -8,9 +8,12 @@ from typing import Literal
 import numpy as np
 
 from romgen.arrays import FloatArray
+from romgen.backbone import Backbone
 from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.lifted_orbit import Measure
 from romgen.provenance import Provenance
 from romgen.reduced_model import ReducedModel
+from romgen.settings import AcceptanceSettings
 from romgen.structure import Modes, Preload, RingDown, Structure
 from romgen.trajectory import Trajectory
 
@@ -50,22 +53,6 @@ class StageCost:
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What the headline numbers are judged by; the report states them next to the verdict.
-
-    Attributes
-    ----------
-    nmte_percent : largest NMTE of any validation motion.
-    fmu_relative : largest relative difference between FMU and Python model under the same input.
-    preload_percent : largest difference between contact resultant and applied force.
-    """
-
-    nmte_percent: float = 5.0
-    fmu_relative: float = 1e-9
-    preload_percent: float = 0.1
-
-
-@dataclass(frozen=True)
 class ReportInputs:
     """Everything a report can show; only the name of the study is required.
 
@@ -77,6 +64,8 @@ class ReportInputs:
     ring_downs : the computed transients with their energies.
     reconstructions : recorded motions against the reduced model.
     model : the reduced model.
+    backbones : free vibration of the reduced model, one per mode and kind.
+    sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
     fmu_export, fmu_check : the exported unit and how well it repeats the Python model.
     stages : cost of each stage, in running order.
     warnings : one line per thing a reader must know.
@@ -93,10 +82,13 @@ class ReportInputs:
     ring_downs: tuple[RingDown, ...] = ()
     reconstructions: tuple[Reconstruction, ...] = ()
     model: ReducedModel | None = None
+    backbones: tuple[Backbone, ...] = ()
+    sensor: str | None = None
+    measure: Measure = "sqrt2_rms"
     fmu_export: FmuExport | None = None
     fmu_check: FmuCheck | None = None
     stages: tuple[StageCost, ...] = ()
     warnings: tuple[str, ...] = ()
     provenance: Provenance | None = None
     command: str = "romgen run study.toml"
-    limits: Limits = field(default_factory=Limits)
+    limits: AcceptanceSettings = field(default_factory=AcceptanceSettings)

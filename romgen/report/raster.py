@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
 from romgen.arrays import BoolArray, FloatArray, IntArray
+from romgen.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Raster:
     extent: tuple[float, float, float, float]
 
 
-@njit(cache=True)
+@compiled
 def _fill(
     p: FloatArray, triangles: IntArray, drawn: BoolArray, triangle: IntArray, weights: FloatArray, edge_px: FloatArray
 ) -> None:

@@ -7,12 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from romgen.provenance import Provenance
+from romgen.report.backbone_figures import backbone_figure, backbone_name
 from romgen.report.blocks import Block, ListingBlock, Section, TableBlock, TextBlock
 from romgen.report.contact_figures import contact_figure, convergence_figure, resultant_table
 from romgen.report.cost_figures import cost_figure, cost_table
 from romgen.report.fmu_tables import check_table, export_table, problem_listing
 from romgen.report.inputs import ReportInputs
+from romgen.report.instantaneous_figures import instantaneous_figure
 from romgen.report.mode_tables import frequency_table, ratio_table
+from romgen.report.model_tables import coefficient_table, spectrum_table
 from romgen.report.ringdown_figures import energy_figure, energy_table, nmte_table, ringdown_figure
 from romgen.report.spectrogram_figures import spectrogram_figure
 from romgen.report.structure_figures import mesh_figure, mode_figure
@@ -89,8 +92,26 @@ def spectrogram_section(inputs: ReportInputs) -> Section | None:
         return None
     unseen = tuple(pair for pair in inputs.reconstructions if pair.role == "validation") or inputs.reconstructions
     frequency_hz = inputs.model.eigenvalues.imag / (2.0 * np.pi)
-    figures = tuple(spectrogram_figure(pair, frequency_hz, inputs.model.internal_resonance) for pair in unseen)
-    return Section("spectrogram", "Spectrogram", figures)
+    maps = (spectrogram_figure(pair, frequency_hz, inputs.model.internal_resonance) for pair in unseen)
+    curves = (instantaneous_figure(pair, frequency_hz) for pair in unseen)
+    return Section("spectrogram", "Frequency content and damping of the decay", (*maps, *curves))
+
+
+def model_section(inputs: ReportInputs) -> Section | None:
+    """The equations that were learned."""
+    if inputs.model is None:
+        return None
+    tables = (spectrum_table(inputs.model), coefficient_table(inputs.model, None))
+    return Section("model", "Reduced model", tables)
+
+
+def backbone_section(inputs: ReportInputs) -> Section | None:
+    """Free vibration of the reduced model."""
+    if not inputs.backbones:
+        return None
+    figure = backbone_figure(inputs.backbones, inputs.sensor, inputs.measure)
+    notes = tuple(TextBlock(f"{backbone_name(curve)}: {note}.") for curve in inputs.backbones for note in curve.notes)
+    return Section("backbone", "Backbone and damping", (figure, *notes))
 
 
 def fmu_section(inputs: ReportInputs) -> Section | None:
@@ -128,6 +149,7 @@ def provenance_table(provenance: Provenance) -> TableBlock:
         ("Python", provenance.python),
         ("system", f"{provenance.system}, {provenance.machine}, {provenance.cpu_count} processors"),
         ("threads of compiled kernels", f"{provenance.numba_threads}"),
+        *((f"seed of {name}", f"{seed}") for name, seed in provenance.seeds.items()),
         *provenance.environment.items(),
         *provenance.packages.items(),
     )
@@ -141,7 +163,9 @@ BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
     modes_section,
     ringdown_section,
     spectrogram_section,
+    model_section,
     energy_section,
+    backbone_section,
     fmu_section,
     cost_section,
     provenance_section,

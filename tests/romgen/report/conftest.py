@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
+from romgen.backbone import backbone
 from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.polynomial import PolynomialMap
 from romgen.provenance import collect_provenance
@@ -193,10 +194,13 @@ def full_inputs(
         ring_downs,
         reconstructions,
         model,
+        (backbone(model, 0), backbone(model, 0, slaved=True), backbone(model, 1)),
+        None,
+        "sqrt2_rms",
         FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),
         FmuCheck((), 3.1e-12, 1e-12, 2e-12, 3.1e-12, (), 4e-10, 1e-4, 2000),
         stages,
         ("validation motion 'mixed' starts outside the trained range of mode 2",),
-        collect_provenance("0123456789abcdef", "{}"),
+        collect_provenance("0123456789abcdef", "{}", {"folds": 0}),
         "romgen run models/clamped_arch/study.toml",
     )

@@ -108,6 +108,8 @@ ABSENT = {
     "ringdowns": {"reconstructions": ()},
     "spectrogram": {"model": None},
     "energy": {"ring_downs": ()},
+    "model": {"model": None},
+    "backbone": {"backbones": ()},
     "fmu": {"fmu_export": None, "fmu_check": None},
     "cost": {"stages": ()},
 }
