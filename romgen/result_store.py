@@ -115,13 +115,23 @@ class ResultStore:
             if not file.is_file():
                 continue
             try:
-                with open_for_reading(file) as opened:
-                    infos |= {stage: _info(opened[stage]) for stage in opened}
+                infos |= read_infos(file)
             except StoreError as error:
                 aside = self.path.with_name(f"{file.name}.damaged")
                 file.replace(aside)
                 log.warning("%s; moved to %s, its stages are computed again", error, aside.name)
         return infos
+
+
+def read_infos(path: Path) -> dict[str, StageInfo]:
+    """Return how each stage in a result file came about.
+
+    Raises
+    ------
+    StoreError : the file is truncated, damaged or foreign.
+    """
+    with open_for_reading(path) as opened:
+        return {stage: _info(opened[stage]) for stage in opened}
 
 
 def _info(group: h5py.Group) -> StageInfo:

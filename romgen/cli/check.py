@@ -18,7 +18,7 @@ def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False
     warnings, size = study_warnings(study), estimate(study)
     for warning in warnings:
         out.text(f"warning: {warning}")
-    out.text(_kind(study))
+    out.text(describe(study))
     if size is not None:
         memory, minutes = size.memory_bytes / 1e9, size.wall_s / 60.0
         out.text(f"{size.dofs} displacement unknowns")
@@ -28,7 +28,7 @@ def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False
     out.document({"study": study.name, "problems": [], "warnings": warnings, "estimate": sizes})
 
 
-def _kind(study: Study) -> str:
+def describe(study: Study) -> str:
     """Say in one line what the study consists of."""
     if study.data is not None:
         data = study.data

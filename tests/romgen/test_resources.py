@@ -1,0 +1,38 @@
+"""Wall time and memory of a block."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from romgen.resources import SAMPLE_INTERVAL_S, measured, resident_bytes
+
+
+@pytest.mark.skipif(resident_bytes() == 0, reason="this system does not show resident memory")
+def test_peak_of_memory_that_is_freed_inside_the_block() -> None:
+    size = 128 * 2**20
+    before = resident_bytes()
+    with measured() as usage:
+        block = np.ones(size // 8)
+        time.sleep(5 * SAMPLE_INTERVAL_S)
+        del block
+    assert usage.peak_memory_bytes >= before + 0.9 * size
+    with measured() as idle:
+        time.sleep(2 * SAMPLE_INTERVAL_S)
+    assert idle.peak_memory_bytes < usage.peak_memory_bytes - 0.5 * size
+
+
+def test_wall_time_also_when_the_block_fails() -> None:
+    usages = []
+
+    def failing_block() -> None:
+        with measured() as usage:
+            usages.append(usage)
+            time.sleep(0.05)
+            raise ValueError("on purpose")
+
+    with pytest.raises(ValueError, match="on purpose"):
+        failing_block()
+    assert usages[0].wall_s >= 0.05
