@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.report.blocks import ListingBlock, TableBlock
 
@@ -37,6 +39,13 @@ def check_table(check: FmuCheck, limit: float) -> TableBlock:
         f"largest magnitude of states, displacements and velocities over {check.n_step} steps of {check.step_size:g} s."
     )
     return TableBlock(caption, ("run", "input", "difference [1]", "limit [1]", "verdict"), tuple(rows), True)
+
+
+def replay_table(replays: Mapping[str, float]) -> TableBlock:
+    """Held-out motions rebuilt by the native unit."""
+    rows = tuple((name, f"{nmte:.3f}") for name, nmte in replays.items())
+    caption = "Sensor displacement of the validation motions, rebuilt by the native unit from the start state alone."
+    return TableBlock(caption, ("trajectory", "NMTE at the sensors [%]"), rows)
 
 
 def problem_listing(check: FmuCheck) -> ListingBlock:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -10,6 +11,7 @@ import numpy as np
 from romgen.arrays import FloatArray
 from romgen.backbone import Backbone
 from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.forced_curve import ForcedResponse
 from romgen.lifted_orbit import Measure
 from romgen.provenance import Provenance
 from romgen.reduced_model import ReducedModel
@@ -64,9 +66,11 @@ class ReportInputs:
     ring_downs : the computed transients with their energies.
     reconstructions : recorded motions against the reduced model.
     model : the reduced model.
+    forced_response : frequency response at all levels.
     backbones : free vibration of the reduced model, one per mode and kind.
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
-    fmu_export, fmu_check : the exported unit and how well it repeats the Python model.
+    fmu_exports, fmu_check : the exported units and how well they repeat the Python model.
+    fmu_replays : held-out trajectory -> NMTE in percent of its sensors rebuilt by the native unit.
     stages : cost of each stage, in running order.
     warnings : one line per thing a reader must know.
     provenance : versions, hashes and machine.
@@ -82,11 +86,13 @@ class ReportInputs:
     ring_downs: tuple[RingDown, ...] = ()
     reconstructions: tuple[Reconstruction, ...] = ()
     model: ReducedModel | None = None
+    forced_response: ForcedResponse | None = None
     backbones: tuple[Backbone, ...] = ()
     sensor: str | None = None
     measure: Measure = "sqrt2_rms"
-    fmu_export: FmuExport | None = None
+    fmu_exports: tuple[FmuExport, ...] = ()
     fmu_check: FmuCheck | None = None
+    fmu_replays: Mapping[str, float] = field(default_factory=dict)
     stages: tuple[StageCost, ...] = ()
     warnings: tuple[str, ...] = ()
     provenance: Provenance | None = None

@@ -11,7 +11,8 @@ from romgen.report.backbone_figures import backbone_figure, backbone_name
 from romgen.report.blocks import Block, ListingBlock, Section, TableBlock, TextBlock
 from romgen.report.contact_figures import contact_figure, convergence_figure, resultant_table
 from romgen.report.cost_figures import cost_figure, cost_table
-from romgen.report.fmu_tables import check_table, export_table, problem_listing
+from romgen.report.fmu_tables import check_table, export_table, problem_listing, replay_table
+from romgen.report.forced_figures import modal_figure, response_figure, response_table
 from romgen.report.inputs import ReportInputs
 from romgen.report.instantaneous_figures import instantaneous_figure
 from romgen.report.mode_tables import frequency_table, ratio_table
@@ -105,6 +106,17 @@ def model_section(inputs: ReportInputs) -> Section | None:
     return Section("model", "Reduced model", tables)
 
 
+def forced_section(inputs: ReportInputs) -> Section | None:
+    """Frequency response at all levels."""
+    response = inputs.forced_response
+    if response is None or not response.curves:
+        return None
+    modal: tuple[Block, ...] = () if inputs.model is None else (modal_figure(response, inputs.model),)
+    notes = tuple(TextBlock(f"{note[:1].upper()}{note[1:]}.") for note in response.notes)
+    blocks = (response_figure(response, inputs.backbones), response_table(response), *modal, *notes)
+    return Section("forced", "Forced response", blocks)
+
+
 def backbone_section(inputs: ReportInputs) -> Section | None:
     """Free vibration of the reduced model."""
     if not inputs.backbones:
@@ -116,12 +128,13 @@ def backbone_section(inputs: ReportInputs) -> Section | None:
 
 def fmu_section(inputs: ReportInputs) -> Section | None:
     """The exported unit and its checks."""
-    export, check = inputs.fmu_export, inputs.fmu_check
-    exported: tuple[Block, ...] = () if export is None else (export_table(export),)
+    check = inputs.fmu_check
+    exported = tuple(export_table(export) for export in inputs.fmu_exports)
+    replayed: tuple[Block, ...] = (replay_table(inputs.fmu_replays),) if inputs.fmu_replays else ()
     checked: tuple[Block, ...] = ()
     if check is not None:
         checked = (check_table(check, inputs.limits.fmu_relative), problem_listing(check))
-    blocks = (*exported, *checked)
+    blocks = (*exported, *checked, *replayed)
     return Section("fmu", "Exported FMU", blocks) if blocks else None
 
 
@@ -165,6 +178,7 @@ BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
     spectrogram_section,
     model_section,
     energy_section,
+    forced_section,
     backbone_section,
     fmu_section,
     cost_section,

@@ -10,10 +10,12 @@ import pytest
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.backbone import backbone
 from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.forced_response import forced_response
 from romgen.polynomial import PolynomialMap
 from romgen.provenance import collect_provenance
 from romgen.reduced_model import ReducedModel
 from romgen.report import Reconstruction, ReportInputs, StageCost
+from romgen.settings import ForcedResponseSettings
 from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, Structure
 from romgen.trajectory import Trajectory
 
@@ -194,11 +196,13 @@ def full_inputs(
         ring_downs,
         reconstructions,
         model,
+        forced_response(model, ForcedResponseSettings(levels=(1.0, 2.0), sensor="mid")),
         (backbone(model, 0), backbone(model, 0, slaved=True), backbone(model, 1)),
         None,
         "sqrt2_rms",
-        FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),
+        (FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),),
         FmuCheck((), 3.1e-12, 1e-12, 2e-12, 3.1e-12, (), 4e-10, 1e-4, 2000),
+        {"mixed": 2.93},
         stages,
         ("validation motion 'mixed' starts outside the trained range of mode 2",),
         collect_provenance("0123456789abcdef", "{}", {"folds": 0}),
