@@ -120,26 +120,51 @@ def solve_at(system: ParameterSystem, x0: FloatArray, p: float, settings: Contin
     return np.asarray(v[:-1] * settings.state_scale, dtype=np.float64)
 
 
+def switch_branch(
+    system: ParameterSystem, x: FloatArray, p: float, settings: ContinuationSettings, distance: float = 0.05
+) -> tuple[FloatArray, float]:
+    """Return a solution (x, p) on the other branch through a simple branch point.
+
+    It lies on the plane phi . (x - x_b) = distance (in state scales) with F_x phi = 0.
+
+    Parameters
+    ----------
+    x, p : the located branch point.
+
+    Raises
+    ------
+    NumericalError : the corrector found no solution on that plane.
+
+    Source: Keller 1977, ch. 5 (perpendicular to the null vector).
+    """
+    curve = _Curve(system, settings, x.size)
+    _, F_x, _ = system.linearise(x, p)
+    null = np.linalg.svd(F_x)[2][-1]
+    normal = np.append(null, 0.0)
+    v, _ = curve.correct(np.append(x, p) / curve.scale + distance * normal, normal)
+    u = v * curve.scale
+    return np.asarray(u[:-1], dtype=np.float64), float(u[-1])
+
+
 def _follow(curve: _Curve, start: _Point) -> tuple[list[_Point], End]:
     """March from ``start`` along its tangent until something ends the branch."""
     s = curve.settings
     points: list[_Point] = []
     h, here, farthest = s.first_step, start, 0.0
     while len(points) < s.points:
+        if h < s.smallest_step:
+            return points, "stalled"
         trial, factor = _trial(curve, here, h)
         if trial is None:
             h *= factor
-            if h < s.smallest_step:
-                return points, "stalled"
             continue
         distance = float(np.linalg.norm(trial.v - start.v))
         farthest = max(farthest, distance)
         if distance < trial.step < 0.3 * farthest and trial.tangent @ start.tangent > 0.5:
             return [*points, *_located(curve, here, trial), start], "closed"
-        boundary = _boundary(curve, here, trial)
-        if boundary is not None:
-            reached = [] if np.allclose(boundary.v, here.v, atol=s.smallest_step, rtol=0.0) else [boundary]
-            return [*points, *(_located(curve, here, boundary) if reached else []), *reached], "range"
+        p, (lower, upper) = float(trial.v[-1] * curve.scale[-1]), s.parameter_range
+        if not lower <= p <= upper:
+            return [*points, *_to_bound(curve, here, trial, lower if p < lower else upper)], "range"
         points += [*_located(curve, here, trial), trial]
         if np.max(np.abs(trial.v[:-1])) * s.state_scale > s.state_limit:
             return points, "limit"
@@ -162,18 +187,17 @@ def _trial(curve: _Curve, here: _Point, h: float) -> tuple[_Point | None, float]
     return trial, float(np.clip(0.7 * s.turn / max(angle, 1e-12), 0.6, 1.0 if iterations > 5 else 1.6))
 
 
-def _boundary(curve: _Curve, here: _Point, trial: _Point) -> _Point | None:
-    """Return the point of the branch on the parameter bound that the step crossed, or None."""
-    p = float(trial.v[-1] * curve.scale[-1])
-    lower, upper = curve.settings.parameter_range
-    if lower <= p <= upper:
-        return None
-    bound = (lower if p < lower else upper) / curve.scale[-1]
-    share = (bound - here.v[-1]) / (trial.v[-1] - here.v[-1])
-    guess = here.v + np.clip(share, 0.0, 1.0) * (trial.v - here.v)
-    guess[-1] = bound
+def _to_bound(curve: _Curve, here: _Point, trial: _Point, bound: float) -> list[_Point]:
+    """Return the end of the branch on the parameter bound that the step crossed, after the special points before it."""
+    target = bound / curve.scale[-1]
+    share = float(np.clip((target - here.v[-1]) / (trial.v[-1] - here.v[-1]), 0.0, 1.0))
+    if share * trial.step < curve.settings.smallest_step:
+        return []
+    guess = here.v + share * (trial.v - here.v)
+    guess[-1] = target
     v, _ = curve.correct(guess, np.append(np.zeros(guess.size - 1), 1.0))
-    return curve.point(v, here.tangent, float(share) * trial.step)
+    end = curve.point(v, here.tangent, share * trial.step)
+    return [*_located(curve, here, end), end]
 
 
 def _tests(point: _Point) -> dict[Kind, float]:

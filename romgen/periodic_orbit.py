@@ -92,6 +92,11 @@ class HarmonicBalance:
         phase = 2.0 * np.pi * np.arange(n_phase) / n_phase
         return np.asarray(np.exp(1j * np.outer(phase, self.orders)) @ c)
 
+    def shifted(self, x: FloatArray, periods: int) -> FloatArray:
+        """Return the state (n,) of the same motion, ``periods`` forcing periods 2 pi / Omega later."""
+        turn = np.exp(2j * np.pi * periods * self.orders[:, None] / self.forced)
+        return split(np.asarray((self._coefficients(x) * turn).ravel()))
+
     def modal(self, x: FloatArray) -> ComplexArray:
         """Return q (n_point, m): the harmonic r_j of mode j, which the rotating frame keeps."""
         c = join(x).reshape(len(x), self.orders.size, -1)

@@ -60,10 +60,22 @@ class RotatingFrame:
         return np.exp(eigenvalues * (2.0 * np.pi * self.forced / p))
 
     def linear_response(self, omega: float) -> ComplexArray:
-        """Return q (m,) of the linear model, f_j / (i r_j Omega / r_f - lambda_j)."""
-        return np.asarray(self.load / (1j * self.rotation / self.forced * omega - self.eigenvalues))
+        """Return q (m,) of the linear model, f_j / (i Omega - lambda_j) in the driven rows."""
+        return np.asarray(self.load / (1j * omega - self.eigenvalues))
 
-    def orbits(self, q: ComplexArray, omega: FloatArray, n_phase: int) -> ComplexArray:
+    def start(self, q: ComplexArray, omega: float) -> FloatArray:
+        """Return the state x of q (m,); ``omega`` does not enter."""
+        return split(q)
+
+    def modal(self, x: FloatArray) -> ComplexArray:
+        """Return q (n_point, m) of x (n_point, 2m)."""
+        return join(x)
+
+    def shifted(self, x: FloatArray, periods: int) -> FloatArray:
+        """Return the state (2m,) of the same motion, ``periods`` forcing periods 2 pi / Omega later."""
+        return split(np.asarray(join(x) * np.exp(2j * np.pi * periods * self.rotation / self.forced)))
+
+    def orbits(self, x: FloatArray, omega: FloatArray, n_phase: int) -> ComplexArray:
         """Return z over one period 2 pi r_f / Omega, with the non-resonant load to first order.
 
             z_j = q_j e^{i r_j phi} + [r_j != r_f] f_j / (i Omega - lambda_j) e^{i r_f phi}
@@ -71,7 +83,7 @@ class RotatingFrame:
 
         Parameters
         ----------
-        q : (n_point, m); omega : (n_point,) rad/s.
+        x : (n_point, 2m); omega : (n_point,) rad/s.
 
         Returns
         -------
@@ -83,7 +95,7 @@ class RotatingFrame:
         forward = self.dropped_load / (1j * omega[:, None] - self.eigenvalues)
         backward = (self.load + self.dropped_load) / (-1j * omega[:, None] - self.eigenvalues)
         drive = np.exp(1j * self.forced * phase)[None, :, None]
-        z = q[:, None, :] * np.exp(1j * np.outer(phase, self.rotation))
+        z = join(x)[:, None, :] * np.exp(1j * np.outer(phase, self.rotation))
         return np.asarray(z + forward[:, None, :] * drive + backward[:, None, :] * drive.conj())
 
 
