@@ -8,8 +8,8 @@ from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.report.blocks import ListingBlock, TableBlock
 
 
-def export_table(export: FmuExport) -> TableBlock:
-    """What was written."""
+def export_table(kind: str, export: FmuExport) -> TableBlock:
+    """What was written; ``kind`` is native or pythonfmu."""
     rows = (
         ("file", export.path),
         ("size", f"{export.size_bytes:,} bytes"),
@@ -19,7 +19,7 @@ def export_table(export: FmuExport) -> TableBlock:
         ("sha256", export.sha256),
         *(("note", note) for note in export.notes),
     )
-    return TableBlock("The exported unit, FMI 2.0.", ("what", "value"), rows, True)
+    return TableBlock(f"The exported {kind} unit, FMI 2.0.", ("what", "value"), rows, True)
 
 
 def check_table(check: FmuCheck, limit: float) -> TableBlock:

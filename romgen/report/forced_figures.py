@@ -15,14 +15,14 @@ from romgen.reduced_model import ReducedModel
 from romgen.report.backbone_figures import MEASURE_NAMES, backbone_amplitude
 from romgen.report.blocks import FigureBlock, TableBlock
 from romgen.report.curve_table import CurveTable, curve_table
-from romgen.report.style import BLACK, CYCLE, GREY, SHADE, label, new_figure
+from romgen.report.style import BLACK, CYCLE, GREY, SHADE, label, new_figure, unit_text
 
 _THIN, _THICK = 0.7, 1.6
 
 
 def curve_name(curve: ForcedCurve) -> str:
     """Level with unit, and the number of the branch where it is not the main one."""
-    return f"{curve.level:g} {curve.unit}" + (f", branch {curve.branch}" if curve.branch else "")
+    return f"{curve.level:g} {unit_text(curve.unit)}" + (f", branch {curve.branch}" if curve.branch else "")
 
 
 def curve_amplitude(response: ForcedResponse, curve: ForcedCurve) -> FloatArray:
@@ -59,7 +59,7 @@ def _level_colours(curves: Sequence[ForcedCurve]) -> dict[float, str]:
 def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool) -> None:
     """Levels by colour, the rest by line style."""
     colours = _level_colours(curves)
-    unit = curves[0].unit
+    unit = unit_text(curves[0].unit)
     handles = [Line2D([], [], color=colour, label=f"{level:g} {unit}") for level, colour in colours.items()]
     handles += [
         Line2D([], [], color=GREY, label="stable"),

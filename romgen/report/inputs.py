@@ -61,15 +61,15 @@ class ReportInputs:
     Attributes
     ----------
     study : name of the study.
-    title : headline; the name of the study where it is empty.
+    title : headline; the name of the study where there is none.
     structure, preload, modes : the finite-element stages; absent for recorded data.
     ring_downs : the computed transients with their energies.
     reconstructions : recorded motions against the reduced model.
     model : the reduced model.
-    forced_response : frequency response at all levels.
+    forced : frequency response at all levels.
     backbones : free vibration of the reduced model, one per mode and kind.
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
-    fmu_exports, fmu_check : the exported units and how well they repeat the Python model.
+    fmu_export, pythonfmu_export, fmu_check : the exported units and how well they repeat the Python model.
     fmu_replays : held-out trajectory -> NMTE in percent of its sensors rebuilt by the native unit.
     stages : cost of each stage, in running order.
     warnings : one line per thing a reader must know.
@@ -79,18 +79,19 @@ class ReportInputs:
     """
 
     study: str
-    title: str = ""
+    title: str | None = None
     structure: Structure | None = None
     preload: Preload | None = None
     modes: Modes | None = None
     ring_downs: tuple[RingDown, ...] = ()
     reconstructions: tuple[Reconstruction, ...] = ()
     model: ReducedModel | None = None
-    forced_response: ForcedResponse | None = None
+    forced: ForcedResponse | None = None
     backbones: tuple[Backbone, ...] = ()
     sensor: str | None = None
     measure: Measure = "sqrt2_rms"
-    fmu_exports: tuple[FmuExport, ...] = ()
+    fmu_export: FmuExport | None = None
+    pythonfmu_export: FmuExport | None = None
     fmu_check: FmuCheck | None = None
     fmu_replays: Mapping[str, float] = field(default_factory=dict)
     stages: tuple[StageCost, ...] = ()

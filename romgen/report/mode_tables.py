@@ -6,6 +6,7 @@ import itertools
 
 from romgen.arrays import FloatArray
 from romgen.report.blocks import TableBlock
+from romgen.report.style import unit_text
 from romgen.structure import Modes
 
 RATIO_TOLERANCE = 0.05
@@ -23,7 +24,8 @@ def frequency_table(modes: Modes) -> TableBlock:
         for k in range(modes.frequency_hz.size)
     )
     loads = tuple(
-        f"load by {name} [√kg per {unit}]" for name, unit in zip(modes.inputs, modes.input_units, strict=True)
+        f"load by {name} [√kg per {unit_text(unit)}]"
+        for name, unit in zip(modes.inputs, modes.input_units, strict=True)
     )
     caption = (
         "Modes about the preloaded state. "

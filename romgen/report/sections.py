@@ -108,7 +108,7 @@ def model_section(inputs: ReportInputs) -> Section | None:
 
 def forced_section(inputs: ReportInputs) -> Section | None:
     """Frequency response at all levels."""
-    response = inputs.forced_response
+    response = inputs.forced
     if response is None or not response.curves:
         return None
     modal: tuple[Block, ...] = () if inputs.model is None else (modal_figure(response, inputs.model),)
@@ -129,7 +129,8 @@ def backbone_section(inputs: ReportInputs) -> Section | None:
 def fmu_section(inputs: ReportInputs) -> Section | None:
     """The exported unit and its checks."""
     check = inputs.fmu_check
-    exported = tuple(export_table(export) for export in inputs.fmu_exports)
+    exports = (("native", inputs.fmu_export), ("pythonfmu", inputs.pythonfmu_export))
+    exported = tuple(export_table(kind, export) for kind, export in exports if export is not None)
     replayed: tuple[Block, ...] = (replay_table(inputs.fmu_replays),) if inputs.fmu_replays else ()
     checked: tuple[Block, ...] = ()
     if check is not None:

@@ -24,7 +24,7 @@ SHOWN_MODES = 4
 _WIDTH_PX = 1400
 _UNIT_RANGE = Normalize(-1.0, 1.0)
 # Largest drawn modal displacement as a fraction of the model's length.
-_DRAWN_AMPLITUDE = 0.12
+_DRAWN_AMPLITUDE = 0.1
 
 
 def _picture_height_in(points: FloatArray, width_in: float) -> float:

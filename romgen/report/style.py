@@ -78,6 +78,11 @@ def label(axes: Axes, x: str, y: str, title: str = "") -> None:
         axes.set_title(title)
 
 
+def unit_text(unit: str) -> str:
+    """A unit as printed: the FMI spelling m/s2 becomes m/s²."""
+    return unit.replace("2", "²").replace("3", "³")
+
+
 def no_grid(axes: Axes) -> None:
     """Maps and pictures carry no grid lines and a full frame."""
     axes.grid(visible=False)

@@ -109,9 +109,9 @@ ABSENT = {
     "spectrogram": {"model": None},
     "energy": {"ring_downs": ()},
     "model": {"model": None},
-    "forced": {"forced_response": None},
+    "forced": {"forced": None},
     "backbone": {"backbones": ()},
-    "fmu": {"fmu_exports": (), "fmu_check": None, "fmu_replays": {}},
+    "fmu": {"fmu_export": None, "fmu_check": None, "fmu_replays": {}},
     "cost": {"stages": ()},
 }
 

@@ -1,0 +1,89 @@
+"""The lines in the figures are the columns of their tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from romgen.arrays import FloatArray
+from romgen.report import ReportInputs
+from romgen.report.backbone_figures import backbone_figure
+from romgen.report.forced_figures import modal_figure, response_figure
+from romgen.report.ringdown_figures import cycle_s, energy_figure, ringdown_figure
+from romgen.report.style import house_style
+
+
+def drawn(axes: Axes, x: FloatArray, y: FloatArray) -> bool:
+    """Whether the lines of the axes, taken together, pass through all the points (x, y) and no others."""
+    lines = [line.get_xydata() for line in axes.get_lines() if line.get_marker() in (None, "None", "")]
+    points = {tuple(p) for line in lines for p in np.asarray(line, dtype=float) if np.isfinite(p).all()}
+    return points == set(zip(x.tolist(), y.tolist(), strict=True))
+
+
+def test_ring_down(full_inputs: ReportInputs) -> None:
+    """The upper panel shows the main sensor in mm, recorded and reduced."""
+    pair = full_inputs.reconstructions[2]
+    with house_style():
+        block = ringdown_figure(pair)
+    (table,) = block.tables
+    recorded, reduced = block.figure.axes[0].get_lines()
+    np.testing.assert_array_equal(recorded.get_ydata(), 1e3 * table["corner reference"])
+    np.testing.assert_array_equal(reduced.get_ydata(), 1e3 * table["corner reduced model"])
+    np.testing.assert_array_equal(recorded.get_xdata(), table["time"])
+
+
+def test_frequency_response_shows_every_point_of_every_branch(full_inputs: ReportInputs) -> None:
+    """Stable and unstable pieces together are the curve; the dashed ones hold every unstable point."""
+    response = full_inputs.forced
+    assert response is not None
+    with house_style():
+        block = response_figure(response, ())
+    x = np.concatenate([table["frequency"] for table in block.tables])
+    y = 1e3 * np.concatenate([table["amplitude sqrt2_rms mid"] for table in block.tables])
+    assert drawn(block.figure.axes[0], x, y)
+    unstable = np.concatenate([table["stable"] == 0.0 for table in block.tables])
+    assert unstable.any()
+    dashed = [line.get_ydata() for line in block.figure.axes[0].get_lines() if line.get_linestyle() == "--"]
+    assert set(y[unstable].tolist()) <= set(np.concatenate(dashed).tolist())
+
+
+def test_modal_response(full_inputs: ReportInputs) -> None:
+    """One panel per mode."""
+    response, model = full_inputs.forced, full_inputs.model
+    assert response is not None
+    assert model is not None
+    with house_style():
+        block = modal_figure(response, model)
+    for j, axes in enumerate(block.figure.axes):
+        x = np.concatenate([table["frequency"] for table in block.tables])
+        y = np.concatenate([table[f"abs z_{j + 1}"] for table in block.tables])
+        assert drawn(axes, x, y)
+
+
+def test_backbone(full_inputs: ReportInputs) -> None:
+    """Frequency and damping in percent against the amplitude in mm, one row per mode."""
+    with house_style():
+        block = backbone_figure(full_inputs.backbones, None, "max")
+    tables = {table.name: table for table in block.tables}
+    assert set(tables) == {"backbone_mode1_alone", "backbone_mode1_locked", "backbone_mode2_alone"}
+    second = tables["backbone_mode2_alone"]
+    assert drawn(block.figure.axes[2], 1e3 * second["amplitude"], second["frequency"])
+    assert drawn(block.figure.axes[3], 1e3 * second["amplitude"], 100.0 * second["damping ratio"])
+
+
+def test_energy_stack_reaches_the_budget(full_inputs: ReportInputs) -> None:
+    """The upper edge of the stack is what is stored and dissipated, in mJ."""
+    with house_style():
+        block = energy_figure(full_inputs.ring_downs[0])
+    (table,) = block.tables
+    total = sum(table[name] for name in ("kinetic", "strain", "contact", "friction", "damping"))
+    top = block.figure.axes[0].collections[2].get_paths()[0].vertices[:, 1].max()
+    assert top == pytest.approx(1e3 * float(np.max(total)))
+
+
+def test_cycle_of_a_cosine() -> None:
+    """Mean distance of upward zero crossings, to within one sample over the number of cycles."""
+    t = np.linspace(0.0, 1.0, 5001)
+    assert cycle_s(t, np.cos(2 * np.pi * 40.0 * t)) == pytest.approx(1 / 40.0, abs=2e-4 / 38)
+    assert cycle_s(t, np.ones_like(t)) == pytest.approx(1.0)
