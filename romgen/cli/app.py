@@ -9,6 +9,13 @@ import typer
 import romgen
 from romgen.cli.check import check
 from romgen.cli.doctor import doctor
+from romgen.cli.export import export
+from romgen.cli.frc import frc
+from romgen.cli.info import info
+from romgen.cli.learn import learn
+from romgen.cli.report import report
+from romgen.cli.run import run
+from romgen.cli.validate import validate
 
 app = typer.Typer(
     name="romgen",
@@ -36,7 +43,7 @@ def options(
     """Reduced models of jointed, nonlinear structures, shipped as FMUs."""
 
 
-for command in (check, doctor):
+for command in (run, check, learn, frc, export, validate, report, info, doctor):
     app.command()(command)
 
 

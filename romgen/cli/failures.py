@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ParamSpec, TypeVar
 
 import typer
@@ -13,6 +13,7 @@ import typer
 from romgen.errors import RomgenError
 
 INTERRUPTED = 130
+NOTE_INTERRUPTED = "interrupted; what was finished is kept, the same command continues"
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -26,17 +27,18 @@ def reported(command: Callable[P, Result]) -> Callable[P, Result]:
         try:
             return command(*args, **kwargs)
         except RomgenError as error:
-            _tell(str(error).splitlines(), error.exit_code, as_json=bool(kwargs.get("json_output")))
-            raise typer.Exit(error.exit_code) from error
+            lines = str(error).splitlines()
+            if kwargs.get("json_output"):
+                print(json.dumps({"exit_code": error.exit_code, "problems": lines}))
+            raise failure(lines, error.exit_code) from error
         except KeyboardInterrupt:
-            _tell(["interrupted; what was finished is kept, the same command continues"], INTERRUPTED, as_json=False)
-            raise typer.Exit(INTERRUPTED) from None
+            raise failure([NOTE_INTERRUPTED], INTERRUPTED) from None
 
     return wrapper
 
 
-def _tell(lines: list[str], exit_code: int, *, as_json: bool) -> None:
+def failure(lines: Sequence[str], exit_code: int) -> typer.Exit:
+    """Print the lines on stderr and return the exit to raise."""
     for line in lines:
         print(f"romgen: {line}", file=sys.stderr)
-    if as_json:
-        print(json.dumps({"exit_code": exit_code, "problems": lines}))
+    return typer.Exit(exit_code)

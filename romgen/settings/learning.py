@@ -40,10 +40,9 @@ class FmuSettings(Settings):
 
 
 class ReportSettings(Settings):
-    """Table [report]: what is written beside result.h5."""
+    """Table [report]: the headline of report.html, by default the name of the study."""
 
-    title: str | None = None
-    vtu: bool = True
+    title: str = ""
 
 
 class AcceptanceSettings(Settings):

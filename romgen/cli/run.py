@@ -1,0 +1,66 @@
+"""romgen run and the commands that stop earlier."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from romgen.acceptance import verdicts
+from romgen.cli.failures import reported
+from romgen.cli.options import Force, Json, Quiet, RunDir, StudyPath, open_study, run_folder
+from romgen.cli.output import Output
+from romgen.pipeline import run as run_pipeline
+from romgen.runner import RunResult
+from romgen.settings import Study, study_warnings
+
+
+def bring_up_to_date(study: Study, folder: Path, out: Output, *, until: str | None, force: bool) -> RunResult:
+    """Run a study up to a stage with progress and warnings on the console."""
+    for warning in study_warnings(study):
+        out.text(f"warning: {warning}")
+    out.text(f"{study.name} in {folder}")
+    with out.progress() as progress:
+        result = run_pipeline(study, folder, until=until, force=force, progress=progress)
+    for name in result.computed:
+        for message in result.infos[name].messages:
+            out.text(f"  {name}: {message}")
+    return result
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """Return the content of the run's summary.json."""
+    content: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return content
+
+
+@reported
+def run(
+    study_path: StudyPath,
+    run_dir: RunDir = None,
+    force: Force = False,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a study from its model or data to the checked FMU and the report; reuse what is up to date."""
+    study, out = open_study(study_path), Output(quiet=quiet, as_json=json_output)
+    folder = run_folder(study, run_dir)
+    bring_up_to_date(study, folder, out, until=None, force=force)
+    summary = read_summary(folder)
+    _headlines(summary, out)
+    for verdict in verdicts(summary, study.acceptance):
+        if not verdict.passed:
+            out.text(f"limit missed: {verdict.name} = {verdict.value:.4g} > {verdict.limit:g}")
+    out.text(f"FMU      {folder / summary['fmu']['path']}")
+    out.text(f"summary  {folder / 'summary.json'}")
+    out.text(f"report   {folder / 'report.html'}")
+    out.document(summary)
+
+
+def _headlines(summary: dict[str, Any], out: Output) -> None:
+    if "modes" in summary:
+        hertz = ", ".join(f"{value:.2f}" for value in summary["modes"]["frequency_hz"])
+        out.text(f"modes at {hertz} Hz")
+    for role, errors in summary["learn"]["nmte_percent"].items():
+        out.text(f"NMTE {role}: " + ", ".join(f"{name} {value:.2f} %" for name, value in errors.items()))
+    out.text(f"FMU against Python model: {summary['fmu']['native_vs_python_rel']:.1e} relative")

@@ -1,0 +1,53 @@
+"""romgen validate: the numbers of a study, or a single FMU, against their limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from romgen.acceptance import verdicts
+from romgen.cli.failures import failure, reported
+from romgen.cli.options import Force, Json, Quiet, RunDir, open_study, run_folder
+from romgen.cli.output import Output
+from romgen.cli.run import bring_up_to_date, read_summary
+from romgen.errors import AcceptanceError, InputError
+from romgen.fmu.driver import fmpy_problems
+
+
+@reported
+def validate(
+    target: Annotated[Path, typer.Argument(metavar="STUDY_OR_FMU", help="A study.toml, its folder, or an FMU.")],
+    run_dir: RunDir = None,
+    force: Force = False,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Check held-out errors, preload and FMU against [acceptance]; exit code 4 where a limit is missed."""
+    out = Output(quiet=quiet, as_json=json_output)
+    if target.suffix.lower() == ".fmu":
+        _validate_unit(target, out)
+        return
+    study = open_study(target)
+    folder = run_folder(study, run_dir)
+    bring_up_to_date(study, folder, out, until="validation", force=force)
+    judged = verdicts(read_summary(folder), study.acceptance)
+    rows = [(v.name, f"{v.value:.4g}", f"{v.limit:g}", "ok" if v.passed else "MISSED") for v in judged]
+    out.table(("quantity", "value", "limit", ""), rows, numbers=True)
+    out.document([{"name": v.name, "value": v.value, "limit": v.limit, "passed": v.passed} for v in judged])
+    missed = [v.name for v in judged if not v.passed]
+    if missed:
+        raise failure([f"{study.name}: limits missed: {', '.join(missed)}"], AcceptanceError.exit_code)
+
+
+def _validate_unit(path: Path, out: Output) -> None:
+    if not path.is_file():
+        raise InputError("no such file", where=str(path))
+    problems = fmpy_problems(path)
+    for problem in problems:
+        out.text(problem)
+    out.text(f"{path.name}: fmpy reports {len(problems) or 'no'} problem{'s' if len(problems) > 1 else ''}")
+    out.document({"path": str(path), "fmpy_problems": problems})
+    if problems:
+        raise failure([f"{path}: fmpy reports {len(problems)} problems"], AcceptanceError.exit_code)

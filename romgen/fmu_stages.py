@@ -1,0 +1,102 @@
+"""The stages from the reduced model to a checked FMU."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from romgen.arrays import FloatArray
+from romgen.fmu.check import check_fmu
+from romgen.fmu.driver import replay
+from romgen.fmu.export import export_fmu
+from romgen.fmu.python_export import export_pythonfmu
+from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo
+from romgen.learning_stages import learned_model, learned_record, start_state
+from romgen.metrics import nmte_percent
+from romgen.model_stages import recorded
+from romgen.settings import Study
+from romgen.stage import Context, Stage
+from romgen.trajectory import Trajectory
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """The exported units; ``pythonfmu`` is None where the study does not ask for it."""
+
+    native: FmuExport
+    pythonfmu: FmuExport | None
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One held-out motion rebuilt by the native unit from its start state.
+
+    Attributes
+    ----------
+    name : of the trajectory.
+    displacement : (n_time, n_sensor) m, sensors of the unit.
+    nmte_percent : against the recorded sensor displacement.
+    """
+
+    name: str
+    displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
+    nmte_percent: float
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What the exported units are worth: conformity and equality with the Python model, replay of held-out motions."""
+
+    check: FmuCheck
+    replays: tuple[Replay, ...]
+
+
+def fmu_stages(study: Study) -> tuple[Stage, ...]:
+    """Return the stages for export and check."""
+    trajectories = "ringdowns" if study.data is None else "data"
+    return (
+        Stage("fmu", Exported, ("learn",), ("study", "fmu"), export, _unit_names),
+        Stage("validation", Validation, ("fmu", trajectories), (), validate),
+    )
+
+
+def _unit_names(study: Study) -> tuple[str, ...]:
+    return (f"{study.name}.fmu", f"{study.name}_pythonfmu.fmu")[: 2 if study.fmu.pythonfmu else 1]
+
+
+def export(context: Context) -> Exported:
+    """Write the native unit and, if asked for, the pythonfmu one."""
+    study, model = context.study, learned_model(context)
+    paths = [context.run_dir / name for name in _unit_names(study)]
+    errors = learned_record(context).nmte_percent
+    info = FmuInfo(origin=(f"study {study.name}", f"inputs sha256 {context.key}"), errors_percent=errors)
+    native = export_fmu(model, paths[0], study.fmu, info=info, report=context.report)
+    for note in native.notes:
+        log.warning("%s", note)
+    if not study.fmu.pythonfmu:
+        return Exported(native, None)
+    return Exported(native, export_pythonfmu(model, paths[1], study.fmu, info=info))
+
+
+def validate(context: Context) -> Validation:
+    """Check the units with fmpy against the Python model, and replay the held-out motions."""
+    paths: list[Path] = [context.run_dir / name for name in _unit_names(context.study)]
+    check = check_fmu(
+        paths[0], learned_model(context), context.study.fmu, pythonfmu=paths[1] if len(paths) > 1 else None
+    )
+    context.report(0.5, "replay")
+    return Validation(check, tuple(_replay(context, item, paths[0]) for item in recorded(context).validation))
+
+
+def _replay(context: Context, trajectory: Trajectory, unit: Path) -> Replay:
+    """Rebuild a motion from its start state, at the times of the recording."""
+    t, z0 = start_state(context, trajectory)
+    run = replay(unit, t, z0)
+    shown = context.study.fmu.sensors or trajectory.sensors
+    columns = [trajectory.sensors.index(sensor) for sensor in shown]
+    rows = len(trajectory.t) - len(t)
+    expected = trajectory.displacement[rows:][:, columns]
+    return Replay(trajectory.name, run.displacement, nmte_percent(expected, run.displacement))

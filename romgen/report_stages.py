@@ -1,0 +1,72 @@
+"""The last stages: what the run was computed with, and the report."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from romgen.fmu.check import SEED
+from romgen.fmu_stages import Exported, Validation
+from romgen.forced_curve import ForcedResponse
+from romgen.forced_stages import Backbones
+from romgen.learning_stages import learned_model, reconstructions
+from romgen.model_stages import RingDowns
+from romgen.provenance import Provenance, collect_provenance
+from romgen.report.inputs import ReportInputs, StageCost
+from romgen.report.write import ReportFiles, write_report
+from romgen.settings import Study, study_warnings
+from romgen.stage import Context, Stage, study_key
+from romgen.structure import Modes, Preload, Structure
+
+Record = TypeVar("Record")
+
+
+def report_stages(upstream: tuple[str, ...]) -> tuple[Stage, ...]:
+    """Return the stages that look back on all others."""
+    return (
+        Stage("provenance", Provenance, upstream, tuple(Study.model_fields), collect),
+        Stage("report", ReportFiles, ("provenance",), (), write, lambda study: ("report.html",)),
+    )
+
+
+def collect(context: Context) -> Provenance:
+    """Record versions, machine, threads, seeds and all settings."""
+    study = context.study
+    return collect_provenance(study_key(study), study.model_dump_json(), {"input of the FMU check": SEED})
+
+
+def write(context: Context) -> ReportFiles:
+    """Write report.html with its figures, curves and fields."""
+    return write_report(report_inputs(context), context.run_dir)
+
+
+def report_inputs(context: Context) -> ReportInputs:
+    """Gather what the report shows from the stages that there are."""
+    study, infos = context.study, context.infos()
+    ringdowns = _optional(context, "ringdowns", RingDowns)
+    exported = _optional(context, "fmu", Exported)
+    validation = _optional(context, "validation", Validation)
+    backbones = _optional(context, "backbone", Backbones)
+    return ReportInputs(
+        study=study.name,
+        title=study.report.title,
+        structure=_optional(context, "mesh", Structure),
+        preload=_optional(context, "preload", Preload),
+        modes=_optional(context, "modes", Modes),
+        ring_downs=() if ringdowns is None else ringdowns.training + ringdowns.validation,
+        reconstructions=reconstructions(context),
+        model=learned_model(context),
+        forced=_optional(context, "forced_response", ForcedResponse),
+        backbones=() if backbones is None else backbones.curves,
+        sensor=study.forced_response.sensor,
+        measure=study.forced_response.measure,
+        fmu_export=None if exported is None else exported.native,
+        fmu_check=None if validation is None else validation.check,
+        stages=tuple(StageCost(name, info.wall_s, info.peak_memory_bytes) for name, info in infos.items()),
+        warnings=(*study_warnings(study), *(f"{name}: {line}" for name, i in infos.items() for line in i.messages)),
+        provenance=context.record("provenance", Provenance),
+        limits=study.acceptance,
+    )
+
+
+def _optional(context: Context, stage: str, cls: type[Record]) -> Record | None:
+    return context.record(stage, cls) if stage in context.infos() else None
