@@ -1,22 +1,22 @@
 """Anderson acceleration of x <- x + f(x) for several independent cases at once.
 
-Pairs (dx, df) of the last iterations are kept across solves: the map hardly changes from one time step to the next, so
-that a new step starts with the curvature that the old ones found. Walker & Ni, SIAM J. Numer. Anal. 49 (2011), eq. (2.1),
-with the least-squares problem solved by its scaled normal equations.
+Walker & Ni, SIAM J. Numer. Anal. 49 (2011), eq. (2.1), with the least-squares problem solved by its scaled normal
+equations.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from fem.arrays import BoolArray, FloatArray, IntArray
+from fem.compiled import threaded
 
 # Relative to the largest diagonal entry of the normal equations: keeps nearly parallel pairs from cancelling.
 _REGULARISATION = 1e-10
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@threaded
 def _mix(
     active: BoolArray,
     count: IntArray,
@@ -55,7 +55,7 @@ def _mix(
             step[i, c] = s
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@threaded
 def _remember(
     active: BoolArray, count: IntArray, dx: FloatArray, df: FloatArray, gram: FloatArray, x: FloatArray, f: FloatArray
 ) -> None:

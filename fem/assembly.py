@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +13,15 @@ from fem.element import ReferenceElement, reference_element
 from fem.errors import FemInputError
 from fem.kernel import element_forces, element_tangents, gather, scatter_blocks
 from fem.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class BlockPattern:
+    """Block-sparse rows: indptr (n_node + 1,), columns (n_block,), block_map (n_cell n_local^2,) into the blocks."""
+
+    indptr: IntArray
+    columns: IntArray
+    block_map: IntArray
 
 
 @dataclass(frozen=True)
@@ -53,15 +63,21 @@ class Cells:
 
     def assemble(self, blocks: FloatArray) -> sp.csr_matrix:
         """Sparse matrix (n_dof, n_dof) from cell blocks (n_cell, n_local, n_local, 3, 3)."""
+        pattern = self.pattern
+        data = np.zeros((len(pattern.columns), 3, 3))
+        scatter_blocks(pattern.block_map, np.ascontiguousarray(blocks.reshape(-1, 3, 3)), data)
+        shape = (3 * self.n_node, 3 * self.n_node)
+        return sp.bsr_matrix((data, pattern.columns, pattern.indptr), shape=shape).tocsr()
+
+    @cached_property
+    def pattern(self) -> BlockPattern:
+        """Where every cell block goes in the block-sparse matrix."""
         n_local = self.nodes.shape[1]
         rows = np.repeat(self.nodes, n_local, axis=1).ravel()
         columns = np.tile(self.nodes, (1, n_local)).ravel()
         keys, block_map = np.unique(rows * self.n_node + columns, return_inverse=True)
-        data = np.zeros((len(keys), 3, 3))
-        scatter_blocks(block_map.ravel(), np.ascontiguousarray(blocks.reshape(-1, 3, 3)), data)
         indptr = np.searchsorted(keys // self.n_node, np.arange(self.n_node + 1))
-        shape = (3 * self.n_node, 3 * self.n_node)
-        return sp.bsr_matrix((data, keys % self.n_node, indptr), shape=shape).tocsr()
+        return BlockPattern(indptr.astype(np.int64), keys % self.n_node, block_map.ravel())
 
 
 def physical_gradients(
@@ -105,4 +121,4 @@ def mass_blocks(mesh: Mesh, density: float) -> FloatArray:
     n, _ = reference.shape(x)
     _, weights = physical_gradients(reference, (x, w), mesh.points, mesh.cells)
     scalar = density * np.einsum("eq,qa,qb->eab", weights, n, n, optimize=True)
-    return scalar[..., None, None] * np.eye(3)
+    return np.asarray(scalar[..., None, None] * np.eye(3))

@@ -11,7 +11,14 @@ from fem.element import reference_element
 from fem.errors import FemInputError
 from fem.mesh import Mesh
 
-_SIDES = (("x_min", 0, 0.0), ("x_max", 0, 1.0), ("y_min", 1, 0.0), ("y_max", 1, 1.0), ("z_min", 2, 0.0), ("z_max", 2, 1.0))
+_SIDES = (
+    ("x_min", 0, 0.0),
+    ("x_max", 0, 1.0),
+    ("y_min", 1, 0.0),
+    ("y_max", 1, 1.0),
+    ("z_min", 2, 0.0),
+    ("z_max", 2, 1.0),
+)
 
 
 def graded(breakpoints: Sequence[float], cells: Sequence[int]) -> FloatArray:
@@ -75,7 +82,7 @@ def arch(points: FloatArray, rise: float, span: float) -> FloatArray:
     """
     x = points[:, 0]
     lift = np.where(np.abs(x) < 0.5 * span, 0.5 * rise * (1.0 + np.cos(2.0 * np.pi * x / span)), 0.0)
-    return points + np.outer(lift, [0.0, 1.0, 0.0])
+    return np.asarray(points + np.outer(lift, [0.0, 1.0, 0.0]))
 
 
 def _with_midpoints(v: FloatArray) -> FloatArray:
@@ -88,4 +95,4 @@ def _side(cells: IntArray, index: IntArray, counts: list[int], element: str, axi
     reference = reference_element(element)
     on_side = [f for f in reference.faces if np.all(reference.nodes[f, axis] == end)]
     at_end = index[:, axis] == (counts[axis] - 1 if end else 0)
-    return cells[at_end][:, on_side[0]]
+    return np.asarray(cells[at_end][:, on_side[0]])

@@ -128,8 +128,8 @@ def contact_pair(
     ----------
     points : (n_node, 3) all nodes of the model, m.
     slave, master : (n_facet, n_face_local) global node numbers; the integration points belong to the slave.
-    reach : largest initial distance of a pair in m; default half the mean slave facet size. Slave points without a partner
-        are no contact points.
+    reach : largest initial distance of a pair in m; default half the mean slave facet size. Slave points without a
+        partner are no contact points.
     """
     source = surface_points(points, slave)
     distance = reach if reach is not None else 0.5 * float(np.sqrt(source.area.sum() / len(slave)))
@@ -137,7 +137,9 @@ def contact_pair(
     paired = target.found & (np.einsum("gi,gi->g", source.normals, target.normals) < 0.0)
     if not paired.any():
         advice = "check that the surfaces face each other, or enlarge the reach"
-        raise FemInputError("no slave point finds the master surface", where=f"contact {name}", value=distance, advice=advice)
+        raise FemInputError(
+            "no slave point finds the master surface", where=f"contact {name}", value=distance, advice=advice
+        )
     gap = np.einsum("gi,gi->g", source.points - target.points, target.normals)[paired]
     return Contact(
         _operator(source, target, paired, 3 * len(points)),

@@ -1,17 +1,18 @@
 """Mean rotation of every node: it turns a factor of the rest state into a preconditioner for the deflected one.
 
-Where a thin part rotates, its stiff in-plane direction turns into the soft transverse one and the tangent of the rest state
-is a poor model of the current one. Up to strains, K(u) = R K(0) R' with the local rotation R, so that R A^-1 R' with the
-frozen factor A does the work of a new factor.
+Where a thin part rotates, its stiff in-plane direction turns into the soft transverse one and the tangent of the rest
+state is a poor model of the current one. Up to strains, K(u) = R K(0) R' with the local rotation R, so that R A^-1 R'
+with the frozen factor A does the work of a new factor.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit, prange
+from numba import prange
 
 from fem.arrays import FloatArray
+from fem.compiled import threaded
 from fem.model import Model
 from fem.sparse_product import SparseProduct
 
@@ -27,7 +28,7 @@ class NodalRotation:
         return self._half_curl(u)
 
 
-@njit(cache=True, parallel=True)
+@threaded
 def rotate(w: FloatArray, sign: float, x: FloatArray) -> FloatArray:
     """R x (sign = 1) or R' x (sign = -1) node by node with R = exp([w]): Rodrigues' formula.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -59,8 +60,8 @@ class ReferenceElement:
     def stiffness_rule(self) -> tuple[FloatArray, FloatArray]:
         """Points (n_point, dim) and weights (n_point,) for internal force and tangent.
 
-        TET10: 4 points (degree 2, exact for straight sides). HEX20: the 14-point rule of degree 5 of Irons (1971), which
-        keeps full rank. HEX27: 27 points.
+        TET10: 4 points (degree 2, exact for straight sides). HEX20: the 14-point rule of degree 5 of Irons (1971),
+        which keeps full rank. HEX27: 27 points.
         """
         if self.name == "hex20":
             return _irons_14()
@@ -102,7 +103,7 @@ def _basis(name: str) -> tuple[skfem.Element, IntArray]:
     return basis, permutation.astype(np.int64)
 
 
-def _with_midpoints(corners: list[tuple[int, ...]], edges: list[tuple[int, int]]) -> FloatArray:
+def _with_midpoints(corners: Sequence[tuple[int, ...]], edges: Sequence[tuple[int, int]]) -> FloatArray:
     c = np.array(corners, dtype=float)
     return np.vstack([c, [0.5 * (c[a] + c[b]) for a, b in edges]])
 
@@ -143,7 +144,9 @@ def reference_element(name: str) -> ReferenceElement:
     """The reference element of that name; unknown names raise ``FemInputError``."""
     face_of = {"hex20": "quad8", "hex27": "quad9", "tet10": "tri6", "quad8": "", "quad9": "", "tri6": ""}
     if name not in face_of:
-        raise FemInputError("unknown element", where="element", value=name, advice=f"choose one of {', '.join(face_of)}")
+        raise FemInputError(
+            "unknown element", where="element", value=name, advice=f"choose one of {', '.join(face_of)}"
+        )
     solid = bool(face_of[name])
     faces = _face_table(name) if solid else np.empty((0, 0), dtype=np.int64)
     return ReferenceElement(name, _nodes(name), faces, face_of[name])

@@ -1,21 +1,22 @@
 """Unilateral penalty contact with Coulomb friction by return mapping, point by point.
 
-Normal: tau_n = k_n g for g < 0 (penetration), else 0; pressure p = -tau_n. Tangential: trial k_t (s - s_p); if it exceeds
-mu p the slip s_p moves so that abs(tau_t) = mu p. An open point forgets its slip: s_p = s.
+Normal: tau_n = k_n g for g < 0 (penetration), else 0; pressure p = -tau_n. Tangential: trial k_t (s - s_p); if it
+exceeds mu p the slip s_p moves so that abs(tau_t) = mu p. An open point forgets its slip: s_p = s.
 Wriggers, Computational Contact Mechanics, 2nd ed., sec. 5.2 and 10.5; paper, eq. (contact law) with penalty in stick.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from fem.arrays import FloatArray, IntArray
+from fem.compiled import compiled, inlined, threaded
 
 OPEN, STICK, SLIP = 0, 1, 2
 
 
-@njit(cache=True, inline="always")
+@inlined
 def return_map(
     gap: float, s1: float, s2: float, slip1: float, slip2: float, kn: float, kt: float, mu: float
 ) -> tuple[float, float, float, float, float, int]:
@@ -32,7 +33,7 @@ def return_map(
     return tn, t1, t2, s1 - t1 / kt, s2 - t2 / kt, 2
 
 
-@njit(cache=True, parallel=True)
+@threaded
 def tractions(
     initial_gap: FloatArray,
     law: FloatArray,
@@ -44,9 +45,9 @@ def tractions(
 ) -> None:
     """The law at all points and cases.
 
-    initial_gap (n_point,) m; law (n_point, 3) k_n, k_t in Pa/m and mu; relative (3 n_point, n_case) normal and two tangential
-    relative displacements in m; slip and new_slip (n_point, 2, n_case) m; traction (3 n_point, n_case) Pa and status
-    (n_point, n_case) are overwritten.
+    initial_gap (n_point,) m; law (n_point, 3) k_n, k_t in Pa/m and mu; relative (3 n_point, n_case) normal and two
+    tangential relative displacements in m; slip and new_slip (n_point, 2, n_case) m; traction (3 n_point, n_case) Pa
+    and status (n_point, n_case) are overwritten.
     """
     for g in prange(len(initial_gap)):
         for c in range(relative.shape[1]):
@@ -65,7 +66,7 @@ def tractions(
             status[g, c] = state
 
 
-@njit(cache=True)
+@compiled
 def traction_tangents(
     initial_gap: FloatArray, law: FloatArray, relative: FloatArray, slip: FloatArray, tangents: FloatArray
 ) -> None:

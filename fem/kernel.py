@@ -8,15 +8,13 @@ Several load cases (trajectories) march together: fields are (n_dof, n_case), de
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from fem.arrays import FloatArray, IntArray
-
-# The sums over nodes may be reordered (SIMD); nan and inf keep their meaning so that blow-ups are seen.
-_SIMD = {"contract", "reassoc", "nsz", "arcp"}
+from fem.compiled import compiled, inlined, threaded
 
 
-@njit(cache=True, parallel=True, fastmath=_SIMD)
+@threaded
 def element_forces(
     gradients: FloatArray,
     weights: FloatArray,
@@ -80,7 +78,7 @@ def element_forces(
                     forces[e, a, i, c] = fe[i, a]
 
 
-@njit(cache=True, inline="always", fastmath=_SIMD)
+@inlined
 def _stress(F: FloatArray, lam: float, mu: float, S: FloatArray) -> float:
     """From grad u in F: F <- I + grad u, S <- lambda tr(E) I + 2 mu E; returns S:E/2."""
     trace = 0.0
@@ -99,7 +97,7 @@ def _stress(F: FloatArray, lam: float, mu: float, S: FloatArray) -> float:
     return energy
 
 
-@njit(cache=True, parallel=True)
+@threaded
 def gather(pointers: IntArray, entries: IntArray, forces: FloatArray, out: FloatArray) -> None:
     """Add cell forces to nodes in a fixed order, so that the sum does not depend on the thread count.
 
@@ -114,7 +112,7 @@ def gather(pointers: IntArray, entries: IntArray, forces: FloatArray, out: Float
                     out[3 * node + i, c] += forces[entries[k], i, c]
 
 
-@njit(cache=True, parallel=True, fastmath=_SIMD)
+@threaded
 def element_tangents(
     gradients: FloatArray,
     weights: FloatArray,
@@ -169,7 +167,7 @@ def element_tangents(
                             )
 
 
-@njit(cache=True)
+@compiled
 def scatter_blocks(block_map: IntArray, blocks: FloatArray, out: FloatArray) -> None:
     """Add cell blocks (n_block, 3, 3) to the block-sparse data (n_nonzero_block, 3, 3) at ``block_map``."""
     for k in range(len(block_map)):

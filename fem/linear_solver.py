@@ -70,7 +70,9 @@ class SuperLU:
             self._lu = spla.splu(matrix.tocsc(), permc_spec=self._ordering, options=self._options)
         except RuntimeError as error:
             advice = "look for an unconstrained or loose body"
-            raise FemConvergenceError("matrix is singular", where="superlu factor", value=str(error), advice=advice) from error
+            raise FemConvergenceError(
+                "matrix is singular", where="superlu factor", value=str(error), advice=advice
+            ) from error
         self._seconds["factor"] += time.perf_counter() - start
 
     def solve(self, right: FloatArray) -> FloatArray:

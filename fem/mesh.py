@@ -47,4 +47,4 @@ class Mesh:
         _, inverse, counts = np.unique(
             np.sort(facets[:, :corners], axis=1), axis=0, return_inverse=True, return_counts=True
         )
-        return facets[counts[inverse.ravel()] == 1]
+        return np.asarray(facets[counts[inverse.ravel()] == 1])

@@ -24,8 +24,8 @@ AXES = {"x": 0, "y": 1, "z": 2}
 class Body:
     """A meshed part.
 
-    ``kinematics`` "green_lagrange" keeps all terms; "linear" drops the quadratic strain of this body: its error is of the
-    order of its strains and rotations, and it saves the element loop.
+    ``kinematics`` "green_lagrange" keeps all terms; "linear" drops the quadratic strain of this body: its error is of
+    the order of its strains and rotations, and it saves the element loop.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Pair:
-    """A frictional interface between two surfaces named "<body>.<surface>"; penalties default to ``default_penalty``."""
+    """A frictional interface between two surfaces named "<body>.<surface>"; penalties default: ``default_penalty``."""
 
     name: str
     slave: str
@@ -100,7 +100,7 @@ class Model:
     def facets(self, name: str) -> IntArray:
         """Global node numbers of the facets of surface "<body>.<surface>"."""
         index, surface = _locate(self.bodies, name)
-        return self.bodies[index].mesh.surface(surface) + self.offsets[index]
+        return np.asarray(self.bodies[index].mesh.surface(surface) + self.offsets[index])
 
     def elastic_force(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Internal force of all bodies (n_dof, n_case) N and their strain energy (n_case,) J at u (n_dof, n_case) m."""

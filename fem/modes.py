@@ -44,8 +44,8 @@ class Rayleigh:
 def solve_modes(model: Model, state: StaticState, count: int, *, solver: str = "auto") -> ModalBasis:
     """The lowest ``count`` modes by shift-invert Lanczos at 0.
 
-    Closed points are stuck (k_n, k_t), open points carry nothing. Without contact and supports the shift needs stiffness:
-    a singular tangent raises ``FemConvergenceError``.
+    Closed points are stuck (k_n, k_t), open points carry nothing. Without contact and supports the shift needs
+    stiffness: a singular tangent raises ``FemConvergenceError``.
     """
     elastic = model.elastic_tangent(state.u)
     tangent = model.constrain(elastic + model.contact.stick_tangent(state.contact.status[:, 0]))
@@ -72,14 +72,17 @@ def solve_modes(model: Model, state: StaticState, count: int, *, solver: str = "
 def rayleigh(modes: ModalBasis, which: tuple[int, int], ratios: tuple[float, float]) -> Rayleigh:
     """alpha and beta that give two modes (numbered from 0) their damping ratios.
 
-    2 zeta_j omega_j = alpha + beta kappa_j with kappa_j = phi_j' K phi_j, which is omega_j^2 less the share of the contact.
+    2 zeta_j omega_j = alpha + beta kappa_j with kappa_j = phi_j' K phi_j, which is omega_j^2 less the share of the
+    contact.
     """
     kappa = modal_stiffness(modes)[list(which)]
     right = 2.0 * np.array(ratios) * modes.omega[list(which)]
     alpha, beta = np.linalg.solve(np.column_stack([np.ones(2), kappa]), right)
     if alpha < 0.0 or beta < 0.0:
         advice = "choose ratios that C = alpha M + beta K can reach with positive coefficients"
-        raise FemInputError("negative Rayleigh coefficient", where="damping", value=(float(alpha), float(beta)), advice=advice)
+        raise FemInputError(
+            "negative Rayleigh coefficient", where="damping", value=(float(alpha), float(beta)), advice=advice
+        )
     return Rayleigh(float(alpha), float(beta))
 
 

@@ -26,8 +26,9 @@ def hold_modes(
 ) -> StaticState:
     """The static state with Phi' M (u - u_s) = eta under the modal load M Phi c that holds it there.
 
-    f_int(u) + f_contact(u, slip) = p + M Phi c;  unknowns u and c; Newton with bordered elimination. Everything but the held
-    modes has settled, so that a release from here starts close to the slow manifold; friction keeps the history of the way.
+    f_int(u) + f_contact(u, slip) = p + M Phi c;  unknowns u and c; Newton with bordered elimination. Everything but the
+    held modes has settled, so that a release from here starts close to the slow manifold; friction keeps the history of
+    the way.
 
     Parameters
     ----------

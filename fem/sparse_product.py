@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit, prange
+from numba import prange
 
 from fem.arrays import FloatArray, IntArray
+from fem.compiled import threaded
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@threaded
 def _csr_times_block(indptr: IntArray, indices: IntArray, data: FloatArray, x: FloatArray, out: FloatArray) -> None:
     n_case = x.shape[1]
     for row in prange(len(indptr) - 1):

@@ -5,8 +5,8 @@ Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375:
     M a_(n+1-am) + C v_(n+1-af) + (1-af) f_(n+1) + af f_n = (1-af) p_(n+1) + af p_n
     u_(n+1) = u_n + h v_n + h^2 ((1/2-b) a_n + b a_(n+1)),   v_(n+1) = v_n + h ((1-g) a_n + g a_(n+1))
 
-The unknown is a_(n+1). One factor of the iteration matrix at the preloaded, stuck state serves all steps and all cases as
-preconditioner inside Anderson acceleration, so that its precision never enters the answer.
+The unknown is a_(n+1). One factor of the iteration matrix at the preloaded, stuck state serves all steps and all cases
+as preconditioner inside Anderson acceleration, so that its precision never enters the answer.
 """
 
 from __future__ import annotations
@@ -16,49 +16,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import brentq
 
 from fem.anderson import Anderson
 from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
 from fem.corotation import NodalRotation, rotate
-from fem.errors import FemConvergenceError, FemInputError
+from fem.errors import FemConvergenceError
+from fem.generalized_alpha import Scheme
 from fem.linear_solver import LinearSolver, make_solver
-from fem.modes import ModalBasis, Rayleigh
 from fem.model import Model
+from fem.modes import ModalBasis, Rayleigh
+from fem.motion import MotionState, StepRecord
 from fem.preload import StaticState
 from fem.sparse_product import SparseProduct
 
 Excitation = Callable[[float], FloatArray]
-
-
-@dataclass(frozen=True)
-class Scheme:
-    """Coefficients of generalised-alpha for a spectral radius rho at infinite frequency."""
-
-    alpha_m: float
-    alpha_f: float
-    beta: float
-    gamma: float
-
-    @staticmethod
-    def from_radius(rho: float) -> Scheme:
-        """Second order, unconditionally stable for 0 <= rho <= 1 (Chung & Hulbert, eqs. 17, 20, 25)."""
-        if not 0.0 <= rho <= 1.0:
-            raise FemInputError("spectral radius must lie in [0, 1]", where="transient", value=rho)
-        alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
-        difference = 1.0 - alpha_m + alpha_f
-        return Scheme(alpha_m, alpha_f, 0.25 * difference**2, 0.5 - alpha_m + alpha_f)
-
-    def discrete_frequency(self, omega: float, step: float) -> float:
-        """Frequency in rad/s with which the scheme oscillates for an undamped mode omega at that time step."""
-        w = (omega * step) ** 2
-        am, af, b, g = self.alpha_m, self.alpha_f, self.beta, self.gamma
-        # State (u, h v, h^2 a): left @ new = right @ old.
-        left = np.array([[(1.0 - af) * w, 0.0, 1.0 - am], [1.0, 0.0, -b], [0.0, 1.0, -g]])
-        right = np.array([[-af * w, 0.0, -am], [1.0, 1.0, 0.5 - b], [0.0, 1.0, 1.0 - g]])
-        values = np.linalg.eigvals(np.linalg.solve(left, right))
-        return float(np.abs(np.angle(values[np.abs(values.imag).argmax()])) / step)
 
 
 @dataclass(frozen=True)
@@ -72,8 +44,8 @@ class TransientSettings:
     tolerance : residual relative to ``force_scale`` at which a step counts as solved.
     max_iterations : per step; more raise.
     depth : pairs kept by Anderson acceleration.
-    dispersion_correction : give the first modes ``corrected_modes`` the inertia with which the scheme oscillates at their
-        true frequency; the error in their frequency is then of fourth instead of second order in the step.
+    dispersion_correction : give the first modes ``corrected_modes`` the inertia with which the scheme oscillates at
+        their true frequency; the error in their frequency is then of fourth instead of second order in the step.
     corrected_modes : how many.
     solver : linear solver by name.
     """
@@ -82,48 +54,10 @@ class TransientSettings:
     spectral_radius: float = 0.9
     tolerance: float = 1e-4
     max_iterations: int = 60
-    depth: int = 8
+    depth: int = 6
     dispersion_correction: bool = True
     corrected_modes: int = 2
     solver: str = "auto"
-
-
-@dataclass(frozen=True)
-class MotionState:
-    """All that a restart needs; fields (n_dof, n_case) in SI units, u from the undeformed mesh.
-
-    ``force`` is the internal plus contact force at u; ``inertia_a``, ``damping_a``, ``inertia_v``, ``damping_v`` are M a, C a,
-    M v, C v; ``slip`` (n_point, 2, n_case); ``history`` the last displacements (n_kept, n_dof, n_case), newest first;
-    ``work`` (3, n_case) J: friction, damping and external work so far.
-    """
-
-    step: int
-    u: FloatArray
-    v: FloatArray
-    a: FloatArray
-    force: FloatArray
-    inertia_a: FloatArray
-    damping_a: FloatArray
-    inertia_v: FloatArray
-    damping_v: FloatArray
-    slip: FloatArray
-    history: FloatArray
-    work: FloatArray
-
-
-@dataclass(frozen=True)
-class StepRecord:
-    """What one step yields: the new state, its contact, energies (3, n_case) J and iterations (n_case,).
-
-    ``energies`` are kinetic, strain and contact. ``net_force`` (n_dof, n_case) = p - f - C v at the end of the step: the
-    inertia force of the semi-discrete system there (the a of the scheme itself lags by (am - af) h).
-    """
-
-    state: MotionState
-    contact: ContactState
-    energies: FloatArray
-    net_force: FloatArray
-    iterations: IntArray
 
 
 class Transient:
@@ -178,22 +112,14 @@ class Transient:
         """Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,)."""
         count = self.settings.corrected_modes if self.settings.dispersion_correction else 0
         h = self.settings.time_step
-        ratios = []
-        for omega in modes.omega[:count]:
-            if omega * h > 1.0:
-                advice = "use a smaller time step or correct fewer modes"
-                raise FemInputError("time step too large for the mode", where="transient", value=omega * h, advice=advice)
-
-            def miss(x: float, omega: float = omega) -> float:
-                return self.scheme.discrete_frequency(x, h) - omega
-
-            ratios.append((omega / brentq(miss, 0.5 * omega, 2.0 * omega, xtol=1e-14 * omega)) ** 2 - 1.0)
+        ratios = [self.scheme.frequency_corrected_inertia(float(omega), h) for omega in modes.omega[:count]]
         return modes.left[:, :count], np.array(ratios)
 
     def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
         """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case).
 
-        The slip history is that of the equilibrium; the acceleration solves M a = p - f - C v.
+        The slip history (n_point, 2, n_case) defaults to that of the equilibrium; the acceleration solves M a = p - f -
+        C v.
         """
         n_case = displacement.shape[1]
         u = self.equilibrium.u[:, None] + displacement * self._mask
@@ -223,7 +149,8 @@ class Transient:
     def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
         """Yield ``n_step`` steps from ``state``.
 
-        A step that does not converge raises ``FemConvergenceError`` with its residual history; what was yielded is good.
+        A step that does not converge raises ``FemConvergenceError`` with its residual history; what was yielded is
+        good.
         """
         anderson = Anderson(self.model.n_dof, state.u.shape[1], self.settings.depth)
         for _ in range(n_step):
@@ -275,6 +202,7 @@ class Transient:
         h, s = self.settings.time_step, self.scheme
         a = (_extrapolate(old.history, old.v * h) - u0) / (h * h * s.beta)
         iterations = np.zeros(a.shape[1], dtype=np.int64)
+        anderson.forget()
         step = previous = None
         w = self._rotation(u0 + h * h * s.beta * a - self.equilibrium.u[:, None])
         history: list[float] = []
@@ -341,8 +269,3 @@ def _extrapolate(history: FloatArray, shift: FloatArray) -> FloatArray:
     if len(history) == 2:
         return np.asarray(2.0 * history[0] - history[1])
     return np.asarray(3.0 * history[0] - 3.0 * history[1] + history[2])
-
-
-def with_tolerance(settings: TransientSettings, tolerance: float) -> TransientSettings:
-    """The same settings at another residual tolerance."""
-    return replace(settings, tolerance=tolerance)

@@ -116,7 +116,7 @@ class EnergyLedger:
     """Energies in J at every time of a transient; imbalance = what the scheme itself gains or loses.
 
     imbalance = kinetic + strain + contact + friction + damping - external - initial sum.
-    All arrays (n_time,): kinetic, strain and contact are stored, relative to rest; friction and damping are
+    All arrays (n_time,): kinetic, strain and contact are stored, the preload included; friction and damping are
     dissipated since t = 0; external is the work of the dead loads and of the base since t = 0.
     """
 

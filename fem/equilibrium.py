@@ -1,0 +1,113 @@
+"""What the loads make an interface carry, and what it does carry: the check of a preload."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.arrays import FloatArray, IntArray
+from fem.contact import ContactState
+from fem.model import AXES, Model
+
+
+@dataclass(frozen=True)
+class InterfaceState:
+    """One contact pair at one state.
+
+    ``point`` selects its points among all contact points; pressure, gap (n,) and traction (n, 2) in SI units; status (n,);
+    ``normal_force`` is the resultant of the pressure and ``applied_force`` what the loads send through the pair, nan where
+    supports on both sides leave that open; ``contact_area`` is the area of the closed points.
+    """
+
+    name: str
+    point: IntArray
+    pressure: FloatArray
+    traction: FloatArray
+    gap: FloatArray
+    status: IntArray
+    normal_force: float
+    applied_force: float
+    contact_area: float
+
+
+def interface_states(model: Model, u: FloatArray, state: ContactState, case: int = 0) -> tuple[InterfaceState, ...]:
+    """The state of every pair at u (n_dof,)."""
+    contact = model.contact
+    gap = contact.initial_gap + (contact.operator @ u)[::3]
+    traction = state.traction[:, case].reshape(-1, 3)
+    result = []
+    for number, name in enumerate(contact.names):
+        point = np.flatnonzero(contact.pair == number)
+        pressure, area = -traction[point, 0], contact.area[point]
+        status = state.status[point, case]
+        result.append(
+            InterfaceState(
+                name,
+                point,
+                pressure,
+                traction[point, 1:],
+                gap[point],
+                status,
+                float(pressure @ area),
+                applied_force(model, number),
+                float(area[status > 0].sum()),
+            )
+        )
+    return tuple(result)
+
+
+def applied_force(model: Model, pair: int) -> float:
+    """Resultant in N that the clamping loads press through a pair, along its mean normal; nan where supports share it.
+
+    Without this pair the bodies fall into groups; the group of the slave or of the master that no support holds along the
+    normal passes all its load on to the pair.
+    """
+    normal = _mean_normal(model, pair)
+    definition = model.pairs[pair]
+    sides = [definition.slave.split(".")[0], definition.master.split(".")[0]]
+    for side, other in (sides, sides[::-1]):
+        group = _group(model, side, pair)
+        if other in group or any(_held(model, body, normal) for body in group):
+            continue
+        load = sum((_load(model, body) for body in group), np.zeros(3))
+        return float(abs(load @ normal))
+    return float("nan")
+
+
+def _mean_normal(model: Model, pair: int) -> FloatArray:
+    rows = 3 * np.flatnonzero(model.contact.pair == pair)
+    # A rigid translation of the slave moves the gap by the normal: read it from the slave half of the operator.
+    name = model.pairs[pair].slave.split(".")[0]
+    start, stop = _dofs(model, name)
+    columns = np.asarray(model.contact.operator[rows][:, start:stop].sum(axis=0)).reshape(-1, 3)
+    normal = columns.sum(axis=0)
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _dofs(model: Model, name: str) -> tuple[int, int]:
+    index = [body.name for body in model.bodies].index(name)
+    start = 3 * int(model.offsets[index])
+    return start, start + 3 * len(model.bodies[index].mesh.points)
+
+
+def _group(model: Model, body: str, without: int) -> set[str]:
+    """Bodies that the other pairs connect to ``body``."""
+    group, grown = {body}, True
+    while grown:
+        grown = False
+        for number, pair in enumerate(model.pairs):
+            ends = {pair.slave.split(".")[0], pair.master.split(".")[0]}
+            if number != without and ends & group and not ends <= group:
+                group, grown = group | ends, True
+    return group
+
+
+def _held(model: Model, body: str, normal: FloatArray) -> bool:
+    directions = [d for s in model.supports if s.surface.split(".")[0] == body for d in s.directions]
+    return any(abs(normal[AXES[d]]) > 1e-3 for d in directions)
+
+
+def _load(model: Model, body: str) -> FloatArray:
+    start, stop = _dofs(model, body)
+    return np.asarray(model.load[start:stop].reshape(-1, 3).sum(axis=0))
