@@ -49,10 +49,11 @@ class TextBlock:
 
 @dataclass(frozen=True)
 class ListingBlock:
-    """Text shown as typed: commands, the printed normal form."""
+    """Text shown as typed: commands, the printed normal form; a folded one opens on request."""
 
     caption: str
     text: str
+    folded: bool = False
 
 
 Block = FigureBlock | TableBlock | TextBlock | ListingBlock

@@ -55,7 +55,7 @@ def _view(block: Block, saved: Mapping[str, SavedFigure]) -> dict[str, object]:
             "words": block.words,
         }
     if isinstance(block, ListingBlock):
-        return {"kind": "listing", "caption": block.caption, "text": block.text}
+        return {"kind": "listing", "caption": block.caption, "text": block.text, "folded": block.folded}
     return {"kind": "text", "text": block.text}
 
 

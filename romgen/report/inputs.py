@@ -75,6 +75,7 @@ class ReportInputs:
     warnings : one line per thing a reader must know.
     provenance : versions, hashes and machine.
     command : the line that makes this report again.
+    vtu : whether field files for ParaView are written.
     limits : what the headline numbers are judged by.
     """
 
@@ -98,4 +99,5 @@ class ReportInputs:
     warnings: tuple[str, ...] = ()
     provenance: Provenance | None = None
     command: str = "romgen run study.toml"
+    vtu: bool = True
     limits: AcceptanceSettings = field(default_factory=AcceptanceSettings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 import numpy as np
@@ -149,8 +150,12 @@ def cost_section(inputs: ReportInputs) -> Section | None:
 def provenance_section(inputs: ReportInputs) -> Section | None:
     """How to make the numbers again and what they were made with."""
     command = ListingBlock("The command that makes this report again.", inputs.command)
-    tables: tuple[Block, ...] = () if inputs.provenance is None else (provenance_table(inputs.provenance),)
-    return Section("provenance", "Provenance and reproduction", (command, *tables))
+    recorded: tuple[Block, ...] = ()
+    if inputs.provenance is not None:
+        settings = json.dumps(json.loads(inputs.provenance.study_json), indent=2)
+        listing = ListingBlock("All settings of the study, defaults included.", settings, folded=True)
+        recorded = (provenance_table(inputs.provenance), listing)
+    return Section("provenance", "Provenance and reproduction", (command, *recorded))
 
 
 def provenance_table(provenance: Provenance) -> TableBlock:
@@ -165,7 +170,7 @@ def provenance_table(provenance: Provenance) -> TableBlock:
         ("threads of compiled kernels", f"{provenance.numba_threads}"),
         *((f"seed of {name}", f"{seed}") for name, seed in provenance.seeds.items()),
         *provenance.environment.items(),
-        *provenance.packages.items(),
+        ("packages", ", ".join(f"{name} {version}" for name, version in provenance.packages.items())),
     )
     return TableBlock("Versions, hashes and machine of this run.", ("what", "value"), rows, True)
 

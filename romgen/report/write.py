@@ -45,9 +45,9 @@ def _save_figure(block: FigureBlock, directory: Path) -> SavedFigure:
 
 
 def write_fields(inputs: ReportInputs, directory: Path) -> tuple[Path, ...]:
-    """Write what there is for ParaView under vtu/; nothing without a mesh."""
+    """Write what there is for ParaView under vtu/; nothing without a mesh or where it is not wanted."""
     structure = inputs.structure
-    if structure is None:
+    if structure is None or not inputs.vtu:
         return ()
     directory.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
@@ -62,8 +62,9 @@ def write_fields(inputs: ReportInputs, directory: Path) -> tuple[Path, ...]:
 
 def _files_section(files: tuple[str, ...]) -> Section:
     """Everything that was written beside the page."""
-    rows = tuple((name,) for name in files)
-    return Section("files", "Files", (TableBlock("Written beside this page.", ("file",), rows, True),))
+    folders = dict.fromkeys(name.partition("/")[0] for name in files)
+    rows = tuple((f"{f}/", ", ".join(n.partition("/")[2] for n in files if n.startswith(f"{f}/"))) for f in folders)
+    return Section("files", "Files", (TableBlock("Written beside this page.", ("folder", "files"), rows, True),))
 
 
 def write_report(inputs: ReportInputs, directory: Path) -> ReportFiles:
