@@ -33,7 +33,7 @@ clean:
 
 .venv/bin/python:
 	@if [ -z "$(PYTHON)" ]; then \
-		echo "romgen needs Python 3.11 or newer; found $$(python3 --version 2>&1). Install one, or: make PYTHON=/path/to/python3.11 run"; \
+		echo "romgen needs Python 3.11 or newer; found $$(python3 --version 2>/dev/null || echo no python3). Install one, or: make PYTHON=/path/to/python3.11 run"; \
 		exit 1; fi
 	@"$(PYTHON)" -m venv .venv || { \
 		echo "$(PYTHON) cannot create a virtual environment; on Debian and Ubuntu: apt install python3-venv"; exit 1; }

@@ -40,9 +40,10 @@ class FmuSettings(Settings):
 
 
 class ReportSettings(Settings):
-    """Table [report]: the headline of report.html, by default the name of the study."""
+    """Table [report]: the headline of report.html, by default the name of the study; fields for ParaView or not."""
 
-    title: str = ""
+    title: str | None = None
+    vtu: bool = True
 
 
 class AcceptanceSettings(Settings):
