@@ -44,8 +44,8 @@ def preload_card(inputs: ReportInputs) -> list[Card]:
     if not known:
         return []
     worst = max(100.0 * abs(i.normal_force_n / i.applied_force_n - 1.0) for i in known)
-    limit = inputs.limits.preload_percent
-    return [Card("Clamping force error", f"{worst:.2g}", "%", f"limit {limit:g} %, worst interface", worst <= limit)]
+    limit, shown = inputs.limits.preload_percent, f"{worst:.2g}" if worst >= 1e-6 else "< 1e-6"
+    return [Card("Clamping force error", shown, "%", f"limit {limit:g} %, worst interface", worst <= limit)]
 
 
 def fmu_card(inputs: ReportInputs) -> list[Card]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
+from scipy.spatial import cKDTree
 
-from romgen.arrays import FloatArray
+from romgen.arrays import FloatArray, IntArray
 from romgen.report.blocks import FigureBlock, TableBlock
 from romgen.report.curve_table import CurveTable, curve_table
 from romgen.report.style import BLUE, DIVERGING, SEQUENTIAL, VERMILLION, label, new_figure, no_grid
@@ -21,6 +24,7 @@ STATUS_NAMES = ("open", "stick", "slip")
 _STATUS_COLOURS = ("#D9DCE2", BLUE, VERMILLION)
 # Hole and edge peaks would wash the map out: the colour scale ends here and the caption says so.
 _CAP_PERCENTILE = 98.0
+_PIXELS = 400
 
 
 def plane_axes(points: FloatArray) -> tuple[int, int]:
@@ -29,37 +33,49 @@ def plane_axes(points: FloatArray) -> tuple[int, int]:
     return first, second
 
 
-def _squares(interface: Interface) -> tuple[FloatArray, tuple[int, int]]:
-    """(n_point, 4, 2) mm: a square of the point's integration area around each point."""
+@dataclass(frozen=True)
+class _NearestPoint:
+    """Which integration point is nearest to every pixel of the plane of an interface, -1 far from all of them."""
+
+    index: IntArray
+    extent_mm: tuple[float, float, float, float]
+    plane: tuple[int, int]
+
+
+def _nearest_point(interface: Interface) -> _NearestPoint:
+    """Pixels belong to the nearest point, but not beyond the width of its integration area."""
     plane = plane_axes(interface.points)
-    half = 0.5 * np.sqrt(interface.area)[:, None, None]
-    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    squares: FloatArray = 1e3 * (interface.points[:, None, plane] + half * corners)
-    return squares, plane
+    flat, width = interface.points[:, plane], np.sqrt(interface.area)
+    low, high = flat.min(axis=0) - 0.4 * width.min(), flat.max(axis=0) + 0.4 * width.min()
+    pixel = (high - low).max() / _PIXELS
+    x, y = (np.arange(low[k] + 0.5 * pixel, high[k], pixel) for k in range(2))
+    distance, index = cKDTree(flat).query(np.stack(np.meshgrid(x, y), axis=-1))
+    near = np.where(distance <= width[index], index, -1)
+    edges = 1e3 * np.array([low[0], low[0] + x.size * pixel, low[1], low[1] + y.size * pixel])
+    return _NearestPoint(near, tuple(edges.tolist()), plane)
 
 
 def _map(
-    axes: Axes, interface: Interface, values: FloatArray, colour_map: Colormap, limits: tuple[float, float]
-) -> PolyCollection:
-    """Colour every integration point by its value."""
-    squares, plane = _squares(interface)
-    patches = PolyCollection(
-        list(squares), array=values, cmap=colour_map, clim=limits, edgecolors="face", linewidths=0.2
+    axes: Axes, seen: _NearestPoint, values: FloatArray, colour_map: Colormap, span: tuple[float, float]
+) -> AxesImage:
+    """Colour every pixel by the value of its integration point."""
+    picture = np.ma.masked_where(seen.index < 0, values[seen.index])
+    low, high = span
+    image = axes.imshow(
+        picture, origin="lower", extent=seen.extent_mm, cmap=colour_map, vmin=low, vmax=high, interpolation="nearest"
     )
-    axes.add_collection(patches)
-    axes.autoscale_view()
-    axes.set_aspect("equal")
-    label(axes, f"{'xyz'[plane[0]]} [mm]", f"{'xyz'[plane[1]]} [mm]")
+    label(axes, *(f"{'xyz'[direction]} [mm]" for direction in seen.plane))
     no_grid(axes)
-    return patches
+    return image
 
 
 def _draw_row(figure: Figure, row: tuple[Axes, Axes, Axes], interface: Interface, cap_mpa: float) -> None:
     """Pressure, gap and status of one interface side by side."""
-    pressure = _map(row[0], interface, 1e-6 * interface.pressure, matplotlib.colormaps[SEQUENTIAL], (0.0, cap_mpa))
+    seen = _nearest_point(interface)
+    pressure = _map(row[0], seen, 1e-6 * interface.pressure, matplotlib.colormaps[SEQUENTIAL], (0.0, cap_mpa))
     largest = max(1e6 * float(np.abs(interface.gap).max()), 1e-6)
-    gap = _map(row[1], interface, 1e6 * interface.gap, matplotlib.colormaps[DIVERGING], (-largest, largest))
-    _map(row[2], interface, interface.status.astype(float), ListedColormap(_STATUS_COLOURS), (-0.5, 2.5))
+    gap = _map(row[1], seen, 1e6 * interface.gap, matplotlib.colormaps[DIVERGING], (-largest, largest))
+    _map(row[2], seen, interface.status.astype(float), ListedColormap(_STATUS_COLOURS), (-0.5, 2.5))
     figure.colorbar(pressure, ax=row[0], label="pressure [MPa]", extend="max", shrink=0.85)
     figure.colorbar(gap, ax=row[1], label="gap [µm]", shrink=0.85)
     row[0].set_title(f"{interface.name}: pressure")
@@ -95,8 +111,8 @@ def contact_figure(preload: Preload) -> FigureBlock:
     figure.legend(handles=handles, loc="outside lower right", ncols=3)
     peak = 1e-6 * max(float(i.pressure.max()) for i in interfaces)
     caption = (
-        "State of the frictional interfaces after preload. Each square is one integration point, its size the area "
-        f"it stands for. Compression is positive; the pressure scale ends at {cap:.1f} MPa "
+        "State of the frictional interfaces after preload. Every spot shows its nearest integration point. "
+        f"Compression is positive; the pressure scale ends at {cap:.1f} MPa "
         f"({_CAP_PERCENTILE:.0f} % of the points lie below), the peak is {peak:.1f} MPa. Open zones and slip at the "
         "edge of the clamping are where damping and amplitude dependence come from."
     )

@@ -9,7 +9,7 @@ from romgen.report.blocks import TableBlock
 from romgen.report.style import unit_text
 from romgen.structure import Modes
 
-RATIO_TOLERANCE = 0.05
+RATIO_TOLERANCE = 0.1
 
 
 def frequency_table(modes: Modes) -> TableBlock:
@@ -71,7 +71,7 @@ def ratio_table(modes: Modes) -> TableBlock:
         for i, j, n, m, detuning in near_integer_ratios(modes.frequency_hz)
     )
     caption = (
-        f"Frequency ratios within {100 * RATIO_TOLERANCE:.0f} % of a ratio of small integers. Such modes may exchange "
-        "energy; both belong on the manifold."
+        f"Frequency ratios within {100 * RATIO_TOLERANCE:.0f} % of a ratio of small integers. Frequencies "
+        "shift with amplitude, so such modes may lock and exchange energy; both belong on the manifold."
     )
     return TableBlock(caption, ("modes", "near", "ratio [1]", "off by [%]"), rows)

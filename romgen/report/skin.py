@@ -15,7 +15,8 @@ from romgen.structure import Structure
 _HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 _TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 _AZIMUTH, _ELEVATION = np.radians(-58.0), np.radians(36.0)
-_LIGHT = np.array([-0.35, -0.45, 0.82])
+# Direction to the light: left, up and towards the viewer.
+_LIGHT = np.array([-0.45, 0.7, 0.55])
 _LINE_PX, _LINE_DARKNESS = 1.3, 0.35
 
 Colouring = Callable[[Raster], FloatArray]
@@ -44,18 +45,29 @@ def triangle_body(structure: Structure) -> IntArray:
     return body
 
 
-def view_frame() -> FloatArray:
-    """(3, 3) orthonormal rows: right and up in the picture, and towards the viewer."""
+def view_frame(points: FloatArray) -> FloatArray:
+    """(3, 3) orthonormal rows: right and up in the picture, and towards the viewer.
+
+    The structure lies flat: its shortest extent points up and its longest to the right and towards the viewer.
+
+    Parameters
+    ----------
+    points : (n_node, 3) m, undeformed.
+    """
+    shortest, _, longest = np.argsort(np.ptp(points, axis=0), kind="stable")
+    axes = np.eye(3)
+    basis = np.array([axes[longest], np.cross(axes[shortest], axes[longest]), axes[shortest]])
     a, e = _AZIMUTH, _ELEVATION
     right = [-np.sin(a), np.cos(a), 0.0]
     up = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
     towards = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
-    return np.array([right, up, towards])
+    frame: FloatArray = np.array([right, up, towards]) @ basis
+    return frame
 
 
-def _brightness(points: FloatArray, triangles: IntArray) -> FloatArray:
+def _brightness(seen: FloatArray, triangles: IntArray) -> FloatArray:
     """(n_triangle,) of light; thin sheets are seen from both sides, so the sign of the normal does not count."""
-    corners = points[triangles]
+    corners = seen[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
     brightness: FloatArray = np.minimum(0.7 + 0.3 * np.abs(normals @ _LIGHT) / length, 1.0)
@@ -73,8 +85,9 @@ def draw_skin(axes: Axes, structure: Structure, points: FloatArray, colouring: C
     colouring : colour of every pixel, (n_row, n_column, 3), from what it sees.
     width_px : columns of the picture.
     """
-    raster = rasterise(points @ view_frame().T, structure.skin, mesh_edges(structure), width_px)
-    light = _brightness(points, structure.skin)[raster.triangle]
+    seen = points @ view_frame(structure.points).T
+    raster = rasterise(seen, structure.skin, mesh_edges(structure), width_px)
+    light = _brightness(seen, structure.skin)[raster.triangle]
     line = 1.0 - _LINE_DARKNESS * np.clip(1.5 * _LINE_PX - raster.edge_px, 0.0, 1.0)
     colours = colouring(raster) * (light * line)[:, :, None]
     opaque = (raster.triangle >= 0).astype(float)
@@ -83,11 +96,14 @@ def draw_skin(axes: Axes, structure: Structure, points: FloatArray, colouring: C
     axes.set_axis_off()
 
 
-def draw_triad(axes: Axes, length: float) -> None:
-    """Arrows x, y, z of the given length in m at the lower left corner of the picture."""
-    right, up, _ = view_frame()
-    x, y = axes.get_xlim()[0] + 0.3 * length, axes.get_ylim()[0] + 0.3 * length
+def draw_triad(axes: Axes, points: FloatArray) -> None:
+    """Arrows x, y, z at the lower left corner of the picture of these points, a tenth of the structure long."""
+    right, up, _ = view_frame(points)
+    length = 0.1 * np.ptp(points, axis=0).max()
+    x = axes.get_xlim()[0] + length * (0.3 - min(right.min(), 0.0))
+    y = axes.get_ylim()[0] + length * (0.3 - min(up.min(), 0.0))
     for k, name in enumerate("xyz"):
         dx, dy = length * right[k], length * up[k]
-        axes.annotate("", (x + dx, y + dy), (x, y), arrowprops={"arrowstyle": "->", "color": "#30343B"})
+        arrow = {"arrowstyle": "->", "color": "#30343B"}
+        axes.annotate("", (x + dx, y + dy), (x, y), arrowprops=arrow, annotation_clip=False)
         axes.text(x + 1.25 * dx, y + 1.25 * dy, name, color="#30343B", fontsize=9, ha="center", va="center")

@@ -21,29 +21,27 @@ from romgen.structure import Modes, Structure
 # Soft tints, one per body, in the order blue, amber, green, pink, grey.
 _BODY_COLOURS = ("#8DBBE0", "#F3CB7D", "#8BCDB5", "#E2B4CE", "#C3C8D0")
 SHOWN_MODES = 4
-_WIDTH_PX = 1400
+_WIDTH_PX = 950
 _UNIT_RANGE = Normalize(-1.0, 1.0)
 # Largest drawn modal displacement as a fraction of the model's length.
 _DRAWN_AMPLITUDE = 0.1
 
 
-def _picture_height_in(points: FloatArray, width_in: float) -> float:
+def _picture_height_in(structure: Structure, points: FloatArray, width_in: float) -> float:
     """Height of the projected model when it fills the given width, within bounds that suit a page."""
-    seen = points @ view_frame().T
+    seen = points @ view_frame(structure.points).T
     spread = np.ptp(seen[:, :2], axis=0)
     return float(np.clip(width_in * spread[1] / spread[0], 1.2, 6.0))
 
 
 def mesh_figure(structure: Structure) -> FigureBlock:
     """The mesh, one colour per body."""
-    figure = new_figure(_picture_height_in(structure.points, FULL_WIDTH_IN) + 0.4)
+    figure = new_figure(_picture_height_in(structure, structure.points, FULL_WIDTH_IN) + 0.4)
     axes = figure.add_subplot()
     body = triangle_body(structure)
     palette = np.array([to_rgba(_BODY_COLOURS[k % len(_BODY_COLOURS)]) for k in range(len(structure.bodies))])
-    draw_skin(
-        axes, structure, structure.points, lambda raster: palette[body[raster.triangle], :3], int(1.5 * _WIDTH_PX)
-    )
-    draw_triad(axes, 0.1 * np.ptp(structure.points, axis=0).max())
+    draw_skin(axes, structure, structure.points, lambda raster: palette[body[raster.triangle], :3], 2 * _WIDTH_PX)
+    draw_triad(axes, structure.points)
     handles = [Patch(facecolor=tuple(palette[k]), label=name) for k, name in enumerate(structure.bodies)]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
     nodes = np.unique(structure.skin)
@@ -87,7 +85,7 @@ def mode_figure(structure: Structure, modes: Modes) -> FigureBlock:
     size = _DRAWN_AMPLITUDE * np.ptp(structure.points, axis=0).max()
     deformed = [structure.points + size * shape for shape in shapes]
     rows, direction = (len(shapes) + 1) // 2, transverse_direction(modes)
-    height = max(_picture_height_in(points, 0.46 * FULL_WIDTH_IN) for points in deformed)
+    height = max(_picture_height_in(structure, points, 0.46 * FULL_WIDTH_IN) for points in deformed)
     figure = new_figure(rows * (height + 0.25))
     grid = figure.subplots(rows, 2, squeeze=False)
     for k, (axes, points, shape) in enumerate(zip(grid.flat, deformed, shapes, strict=False)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from romgen.report.raster import rasterise
@@ -49,11 +51,14 @@ def test_distance_to_drawn_edges() -> None:
     assert np.isinf(raster.edge_px[190, 20])
 
 
-def test_view_frame_is_orthonormal() -> None:
-    """A parallel projection keeps lengths in its plane."""
-    frame = view_frame()
-    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
-    np.testing.assert_allclose(np.cross(frame[0], frame[1]), frame[2], atol=1e-15)
+def test_view_lays_the_structure_flat() -> None:
+    """An orthonormal right-handed frame; the shortest extent points up, the longest runs to the right."""
+    for extents in itertools.permutations((1.0, 2.0, 3.0)):
+        frame = view_frame(np.array([[0.0, 0.0, 0.0], extents]))
+        np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
+        np.testing.assert_allclose(np.cross(frame[0], frame[1]), frame[2], atol=1e-15)
+        assert np.argmax(frame[1]) == np.argmin(extents)
+        assert np.argmax(frame[0]) == np.argmax(extents)
 
 
 def test_diagonals_of_quadrilaterals_are_no_mesh_edges(structure: Structure) -> None:
