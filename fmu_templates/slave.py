@@ -179,7 +179,10 @@ class RomgenSlave(Fmi2Slave):
             self.z = self._internal_step(self.z)
             if not self._trust_ratio() <= self.parameters["hard_limit"]:
                 self.z = before
-                self.log("trust_ratio exceeds hard_limit; the state of the last communication point is kept", Fmi2Status.error)
+                self.log(
+                    "trust_ratio exceeds hard_limit; the state of the last communication point is kept",
+                    Fmi2Status.error,
+                )
                 return False
         self._outputs = None
         if was_inside and not self._inside():

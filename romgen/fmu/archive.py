@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+
+from romgen.store import replace_atomically
 
 DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
@@ -27,16 +27,12 @@ def archive_bytes(files: Mapping[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def write_atomically(path: Path, content: bytes) -> str:
-    """Write a file in one move, so that a reader never sees half of it; returns its SHA-256."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    return hashlib.sha256(content).hexdigest()
+def write_archive(path: Path, files: Mapping[str, bytes]) -> tuple[int, str]:
+    """Write an archive in one move; returns its size in bytes and its SHA-256."""
+    content = archive_bytes(files)
+
+    def write(temporary: Path) -> None:
+        temporary.write_bytes(content)
+
+    replace_atomically(path, write)
+    return len(content), hashlib.sha256(content).hexdigest()

@@ -52,7 +52,7 @@ def check_fmu(
     AcceptanceError : when the native unit differs by more than 1e-9.
     """
     chosen = exported_model(model, settings.sensors)
-    t = settings.step_size * np.arange(n_step + 1)
+    t: FloatArray = settings.step_size * np.arange(n_step + 1, dtype=np.float64)
     start = START_FRACTION * chosen.trained_amplitude.astype(np.complex128) if z0 is None else z0
     u = random_input(chosen, t)
     free = difference(native, chosen, t, start)

@@ -86,9 +86,7 @@ def _sensor_programme(model: ReducedModel) -> MonomialProgramme:
     return monomial_programme(np.vstack([model.displacement.exponents, model.velocity.exponents]))
 
 
-def _dense(
-    programme: MonomialProgramme, exponents: IntArray, coefficients: npt.NDArray[Scalar]
-) -> npt.NDArray[Scalar]:
+def _dense(programme: MonomialProgramme, exponents: IntArray, coefficients: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     """Coefficients over every monomial of the programme, (n_out, n_monomial)."""
     dense = np.zeros((coefficients.shape[0], programme.n_monomial), dtype=coefficients.dtype)
     for k, row in enumerate(exponents):
@@ -117,7 +115,10 @@ def _normal_form(model: ReducedModel, programme: MonomialProgramme) -> str:
 def _products(name: str, programme: MonomialProgramme) -> str:
     if programme.n_monomial > MAX_PRODUCTS:
         raise InputError(
-            f"the {name} map has too many monomials", where="FMU export", value=programme.n_monomial, advice="lower the order"
+            f"the {name} map has too many monomials",
+            where="FMU export",
+            value=programme.n_monomial,
+            advice="lower the order",
         )
     size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_PRODUCT)"
     pairs = [f"{{{left}, {right}}}" for left, right in programme.products] or ["{0, 0}"]

@@ -61,7 +61,10 @@ def requested_platforms(platforms: tuple[str, ...]) -> tuple[str, ...]:
     unknown = [p for p in platforms if p not in {*TARGETS, "host", "all"}]
     if unknown:
         raise InputError(
-            "unknown platform", where="[fmu] platforms", value=unknown[0], advice=f"use host, all or {', '.join(TARGETS)}"
+            "unknown platform",
+            where="[fmu] platforms",
+            value=unknown[0],
+            advice=f"use host, all or {', '.join(TARGETS)}",
         )
     wanted = {host_platform() if p == "host" else p for p in platforms}
     return tuple(TARGETS) if "all" in wanted else tuple(p for p in TARGETS if p in wanted)

@@ -130,7 +130,7 @@ def model_description(text: DescriptionText, interface: FmuInterface, *, guid: s
     )
 
 
-def documentation_page(model: ReducedModel, interface: FmuInterface, info: FmuInfo) -> str:
+def documentation_page(model: ReducedModel, interface: FmuInterface, text: DescriptionText) -> str:
     """The text of documentation/index.html: origin, range, errors, variables, step advice."""
     omega = np.abs(model.eigenvalues)
     zeta = -model.eigenvalues.real / omega
@@ -142,8 +142,9 @@ def documentation_page(model: ReducedModel, interface: FmuInterface, info: FmuIn
     return render(
         "index.html.j2",
         name=model.name,
-        info=info,
-        tool=tool_name(),
+        info=text.info,
+        tool=text.tool,
+        is_native="ModelExchange" in text.interfaces,
         modes=modes,
         order=int(np.max(np.sum(model.displacement.exponents, axis=1))),
         variables=interface.variables,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from fmpy import extract, read_model_description
@@ -90,7 +90,8 @@ def replay(
     t : (n_time,) s, increasing; the communication points.
     z0 : (m,) start state.
     inputs : (n_time, n_input) at the times ``t``, SI units, or None for zero.
-    hold : "constant" holds the value of the start of each step; "linear" passes its slope by fmi2SetRealInputDerivatives.
+    hold : "constant" holds the value of the start of each step; "linear" passes its slope too
+        (fmi2SetRealInputDerivatives).
 
     Raises
     ------
@@ -143,7 +144,7 @@ def _collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
     return callbacks
 
 
-def _references(variables: list[object]) -> References:
+def _references(variables: list[Any]) -> References:
     """References by role: states are what a derivative points to, sensors are outputs in m and m/s."""
 
     def outputs(unit: str) -> tuple[int, ...]:

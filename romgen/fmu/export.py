@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from romgen.fmu.archive import archive_bytes, write_atomically
+from romgen.fmu.archive import write_archive
 from romgen.fmu.build import build_binaries
 from romgen.fmu.coefficients import coefficients_header, sizes_header
 from romgen.fmu.description import (
@@ -60,9 +60,8 @@ def export_fmu(
     content, guid = _content(chosen, settings, info)
     sources = {Path(name).name: data for name, data in content.items() if name.startswith("sources/")}
     binaries = build_binaries(chosen.name, sources, settings.platforms, report)
-    data = archive_bytes({**content, **binaries.files})
-    sha256 = write_atomically(Path(path), data)
-    return FmuExport(str(path), len(data), sha256, guid, binaries.platforms, binaries.compiler, binaries.notes)
+    size, sha256 = write_archive(Path(path), {**content, **binaries.files})
+    return FmuExport(str(path), size, sha256, guid, binaries.platforms, binaries.compiler, binaries.notes)
 
 
 def generated_sources(model: ReducedModel, guid: str) -> dict[str, bytes]:
@@ -83,7 +82,7 @@ def _content(model: ReducedModel, settings: FmuSettings, info: FmuInfo) -> tuple
     description = model_description(text, interface, guid=guid, date=generation_time())
     content = {
         "modelDescription.xml": description.encode(),
-        "documentation/index.html": documentation_page(model, interface, info).encode(),
+        "documentation/index.html": documentation_page(model, interface, text).encode(),
         "resources/rom.json": model_json(model).encode(),
         **licence_files(),
         **{f"sources/{name}": data for name, data in generated_sources(model, guid).items()},

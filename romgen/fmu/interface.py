@@ -1,40 +1,14 @@
-"""The variables of a unit and how they depend on each other; the order is the one the C runtime counts in."""
+"""The variables of a unit together with how they depend on each other."""
 
 from __future__ import annotations
 
-import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from romgen.etdrk4 import largest_step
-from romgen.fmu.coefficients import HARD_LIMIT
 from romgen.fmu.dependencies import sensor_states, state_couplings
-from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
+from romgen.fmu.variables import Variable, input_names, model_variables, sensor_names, state_names
 from romgen.reduced_model import ReducedModel
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One ScalarVariable; ``None`` leaves an attribute out.
-
-    ``reference`` counts Real and Boolean variables apart; ``state`` is the 1-based index of the variable this one is the
-    time derivative of; ``unit`` is None for a Boolean.
-    """
-
-    name: str
-    reference: int
-    description: str
-    causality: str
-    variability: str
-    initial: str | None
-    unit: str | None = "1"
-    start: str | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-    nominal: float | None = None
-    state: int | None = None
 
 
 @dataclass(frozen=True)
@@ -62,202 +36,51 @@ class FmuInterface:
 def build_interface(model: ReducedModel, input_range: tuple[tuple[float, float], ...] = ()) -> FmuInterface:
     """Variables of a model and their dependencies, derived from its nonzero coefficients.
 
+    No output depends directly on an input.
+
     Parameters
     ----------
     model : with m modes, n inputs, s sensors.
     input_range : (minimum, maximum) of each input in training, or ().
     """
-    reals = (
-        *_states(model),
-        *_rates(model),
-        *_inputs(model, input_range),
-        *_sensors(model),
-        *_amplitudes(model),
-        *_parameters(model),
-        *_constants(model),
-    )
-    numbered = [_renumbered(v, k) for k, v in enumerate(reals)]
-    return _with_structure(model, (*numbered, *_booleans()))
-
-
-def sensor_names(model: ReducedModel) -> tuple[tuple[str, str], ...]:
-    """Names of the displacement and velocity output of each sensor: letters, digits and underscores, unique."""
-    clean = [re.sub(r"[^0-9A-Za-z_]", "_", name) for name in model.sensors]
-    pairs = tuple((f"{name}_displacement", f"{name}_velocity") for name in clean)
-    taken = {name for pair in pairs for name in pair} | set(input_names(model))
-    legal = all(re.match(r"[A-Za-z_]", name) for name in clean)
-    if legal and len(taken) == 2 * len(pairs) + len(model.inputs):
-        return pairs
-    return tuple((f"y_{k}_{name}", f"v_{k}_{name}") for k, name in enumerate(clean, 1))
-
-
-def input_names(model: ReducedModel) -> tuple[str, ...]:
-    """Names of the inputs: letters, digits and underscores."""
-    return tuple(re.sub(r"[^0-9A-Za-z_]", "_", name) for name in model.inputs)
-
-
-def state_names(model: ReducedModel) -> tuple[str, ...]:
-    """z1_re, z1_im, z2_re, ..."""
-    return tuple(f"z{j}_{part}" for j in range(1, len(model.eigenvalues) + 1) for part in ("re", "im"))
-
-
-def _renumbered(v: Variable, reference: int) -> Variable:
-    return Variable(**{**v.__dict__, "reference": reference})
-
-
-def _states(model: ReducedModel) -> list[Variable]:
-    nominal = np.repeat(model.trained_amplitude, 2)
-    return [
-        Variable(
-            name, 0, "normal-form coordinate, start value free", "local", "continuous", "exact", "1", "0", nominal=float(a)
-        )
-        for name, a in zip(state_names(model), nominal, strict=True)
-    ]
-
-
-def _rates(model: ReducedModel) -> list[Variable]:
-    omega = np.repeat(np.abs(model.eigenvalues) * model.trained_amplitude, 2)
-    return [
-        Variable(
-            f"der_{name}",
-            0,
-            f"time derivative of {name}",
-            "local",
-            "continuous",
-            "calculated",
-            "1/s",
-            nominal=_two_digits(float(r)),
-            state=k,
-        )
-        for k, (name, r) in enumerate(zip(state_names(model), omega, strict=True), 1)
-    ]
-
-
-def _inputs(model: ReducedModel, input_range: tuple[tuple[float, float], ...]) -> list[Variable]:
-    ranges: tuple[tuple[float | None, float | None], ...] = input_range or ((None, None),) * len(model.inputs)
-    return [
-        Variable(
-            name,
-            0,
-            f"load input {given}, linear in each step through fmi2SetRealInputDerivatives, held otherwise",
-            "input",
-            "continuous",
-            None,
-            unit,
-            "0",
-            low,
-            high,
-        )
-        for name, given, unit, (low, high) in zip(
-            input_names(model), model.inputs, model.input_units, ranges, strict=True
-        )
-    ]
-
-
-def _sensors(model: ReducedModel) -> list[Variable]:
-    names = sensor_names(model)
-    x, v = nominal_displacement(model), nominal_velocity(model)
-    displacement = [
-        _output(pair[0], f"displacement at sensor {given} relative to the rest state", "m", float(a))
-        for pair, given, a in zip(names, model.sensors, x, strict=True)
-    ]
-    velocity = [
-        _output(pair[1], f"velocity at sensor {given} relative to the base", "m/s", float(a))
-        for pair, given, a in zip(names, model.sensors, v, strict=True)
-    ]
-    return displacement + velocity
-
-
-def _output(name: str, description: str, unit: str, nominal: float, minimum: float | None = None) -> Variable:
-    return Variable(
-        name,
-        0,
-        description,
-        "output",
-        "continuous",
-        "calculated",
-        unit,
-        minimum=minimum,
-        nominal=_two_digits(nominal),
-    )
-
-
-def _amplitudes(model: ReducedModel) -> list[Variable]:
-    return [
-        *(
-            _output(f"modal_amplitude_{j}", f"amplitude |z_{j}| of mode {j}", "1", float(a), 0.0)
-            for j, a in enumerate(model.trained_amplitude, 1)
-        ),
-        _output("trust_ratio", "largest modal amplitude in units of the largest trained one", "1", 1.0, 0.0),
-    ]
-
-
-def _parameters(model: ReducedModel) -> list[Variable]:
-    def parameter(name: str, description: str, variability: str, unit: str, start: float) -> Variable:
-        return Variable(name, 0, description, "parameter", variability, "exact", unit, repr(start))
-
-    return [
-        parameter("input_gain", "factor on all inputs", "tunable", "1", 1.0),
-        parameter("trust_radius", "trust_ratio above which inside_trust_region is false; positive", "tunable", "1", 1.0),
-        parameter("hard_limit", "trust_ratio above which a step fails and is not taken; positive", "tunable", "1", HARD_LIMIT),
-        parameter("max_internal_step", "longest step of the integrator; positive", "fixed", "s", largest_step(model.eigenvalues)),
-    ]
-
-
-def _constants(model: ReducedModel) -> list[Variable]:
-    def constant(name: str, description: str, unit: str, value: float) -> Variable:
-        return Variable(name, 0, description, "local", "constant", "exact", unit, repr(value))
-
-    omega = np.abs(model.eigenvalues)
-    zeta = -model.eigenvalues.real / omega
-    return [
-        *(
-            constant(f"natural_frequency_{j}", f"of mode {j} at zero amplitude", "Hz", float(w) / (2.0 * math.pi))
-            for j, w in enumerate(omega, 1)
-        ),
-        *(
-            constant(f"damping_ratio_{j}", f"of mode {j} at zero amplitude", "1", float(d))
-            for j, d in enumerate(zeta, 1)
-        ),
-    ]
-
-
-def _booleans() -> tuple[Variable, ...]:
-    inside = "true while the motion is in the trained range (trust_ratio <= trust_radius)"
-    warn = "leaving the trained range is reported as a warning (true) or only logged (false)"
-    return (
-        Variable("inside_trust_region", 0, inside, "output", "discrete", "calculated", None),
-        Variable("warn_on_crossing", 1, warn, "parameter", "tunable", "exact", None, "true"),
-    )
-
-
-def _with_structure(model: ReducedModel, variables: tuple[Variable, ...]) -> FmuInterface:
-    """Dependencies from the nonzero coefficients: no output depends directly on an input."""
+    variables = model_variables(model, input_range)
     index = {v.name: k for k, v in enumerate(variables, 1)}
-    m = len(model.eigenvalues)
+    rates, initial_rates = _rate_unknowns(model, index)
+    outputs = _output_unknowns(model, index)
+    state = tuple(index[name] for name in state_names(model))
+    inside = index["inside_trust_region"]
+    initial = [*initial_rates, *outputs, Unknown(inside, (*state, index["trust_radius"]))]
+    by_index = tuple(sorted(initial, key=lambda unknown: unknown.index))
+    return FmuInterface(variables, (*outputs, Unknown(inside, state)), tuple(rates), by_index)
+
+
+def _rate_unknowns(model: ReducedModel, index: dict[str, int]) -> tuple[list[Unknown], list[Unknown]]:
+    """The state derivatives while running, and in initialisation, where the input gain counts as known."""
     state = [index[name] for name in state_names(model)]
     inputs = [index[name] for name in input_names(model)]
     couplings, driven = state_couplings(model), model.input_matrix != 0
-    rates, initial_rates = [], []
-    for k in range(2 * m):
-        states = [state[2 * j + part] for j in np.flatnonzero(couplings[k // 2]) for part in (0, 1)]
-        loads = [inputs[i] for i in np.flatnonzero(driven[k // 2])]
-        rates.append(Unknown(state[k] + 2 * m, tuple(sorted(states + loads))))
+    running, initial = [], []
+    for k, name in enumerate(state_names(model)):
+        mode = k // 2
+        states = [state[2 * j + part] for j in np.flatnonzero(couplings[mode]) for part in (0, 1)]
+        loads = [inputs[i] for i in np.flatnonzero(driven[mode])]
         gain = [index["input_gain"]] if loads else []
-        initial_rates.append(Unknown(state[k] + 2 * m, tuple(sorted(states + loads + gain))))
-    outputs = [
-        Unknown(index[name], tuple(state[2 * j + part] for j in np.flatnonzero(seen) for part in (0, 1)))
-        for names, row in zip(zip(*sensor_names(model), strict=True), sensor_states(model), strict=True)
-        for name, seen in zip(names, row, strict=True)
+        running.append(Unknown(index[f"der_{name}"], tuple(sorted(states + loads))))
+        initial.append(Unknown(index[f"der_{name}"], tuple(sorted(states + loads + gain))))
+    return running, initial
+
+
+def _output_unknowns(model: ReducedModel, index: dict[str, int]) -> list[Unknown]:
+    """The Real outputs: sensors, amplitudes, trust ratio."""
+    state = [index[name] for name in state_names(model)]
+    displacement_names, velocity_names = zip(*sensor_names(model), strict=True)
+    seen = dict(zip((*displacement_names, *velocity_names), np.vstack(sensor_states(model)), strict=True))
+    sensors = [
+        Unknown(index[name], tuple(state[2 * j + part] for j in np.flatnonzero(modes) for part in (0, 1)))
+        for name, modes in seen.items()
     ]
-    outputs += [Unknown(index[f"modal_amplitude_{j + 1}"], (state[2 * j], state[2 * j + 1])) for j in range(m)]
-    outputs += [Unknown(index["trust_ratio"], tuple(state))]
-    inside = index["inside_trust_region"]
-    initial = [*initial_rates, *outputs, Unknown(inside, (*state, index["trust_radius"]))]
-    outputs += [Unknown(inside, tuple(state))]
-    return FmuInterface(variables, tuple(outputs), tuple(rates), tuple(sorted(initial, key=lambda u: u.index)))
-
-
-def _two_digits(value: float) -> float:
-    """Two significant digits, so that a nominal value does not change with round-off; 1 for 0."""
-    return float(f"{value:.1e}") or 1.0
+    amplitudes = [
+        Unknown(index[f"modal_amplitude_{j}"], (state[2 * j - 2], state[2 * j - 1]))
+        for j in range(1, len(model.eigenvalues) + 1)
+    ]
+    return [*sensors, *amplitudes, Unknown(index["trust_ratio"], tuple(state))]

@@ -48,7 +48,9 @@ def monomial_programme(exponents: IntArray) -> MonomialProgramme:
     n_var = exponents.shape[1]
     rows = sorted({tuple(int(e) for e in row) for row in exponents}, key=lambda e: (sum(e), e))
     if rows and sum(rows[0]) == 0:
-        raise InputError("a polynomial has a constant term", where="FMU export", advice="shift the model to its rest state")
+        raise InputError(
+            "a polynomial has a constant term", where="FMU export", advice="shift the model to its rest state"
+        )
     index = {tuple(int(i == j) for i in range(n_var)): j for j in range(n_var)}
     products: list[tuple[int, int]] = []
     for row in rows:

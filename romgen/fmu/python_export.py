@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pythonfmu.builder import FmuBuilder
 
-from romgen.fmu.archive import archive_bytes, write_atomically
+from romgen.fmu.archive import write_archive
 from romgen.fmu.description import (
     PYTHON_INTERFACES,
     DescriptionText,
@@ -24,11 +24,12 @@ from romgen.fmu.description import (
     model_description,
     tool_name,
 )
-from romgen.fmu.interface import FmuInterface, Variable, build_interface
+from romgen.fmu.interface import FmuInterface, build_interface
 from romgen.fmu.model_file import model_json
 from romgen.fmu.records import FmuExport, FmuInfo
 from romgen.fmu.selection import exported_model
 from romgen.fmu.templates import licence_files, template_text
+from romgen.fmu.variables import Variable
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
 
@@ -66,13 +67,12 @@ def export_pythonfmu(
         **_built_by_pythonfmu(resources, f"{chosen.name}_slave.py"),
         **licence_files(),
         "documentation/licenses/pythonfmu.txt": _pythonfmu_licence(),
-        "documentation/index.html": documentation_page(chosen, interface, text.info).encode(),
+        "documentation/index.html": documentation_page(chosen, interface, text).encode(),
         "modelDescription.xml": model_description(text, interface, guid=guid, date=generation_time()).encode(),
     }
-    data = archive_bytes(content)
-    sha256 = write_atomically(Path(path), data)
+    size, sha256 = write_archive(Path(path), content)
     platforms = tuple(sorted({name.split("/")[1] for name in content if name.startswith("binaries/")}))
-    return FmuExport(str(path), len(data), sha256, guid, platforms, "pythonfmu", NOTES)
+    return FmuExport(str(path), size, sha256, guid, platforms, "pythonfmu", NOTES)
 
 
 def _numbered_as_registered(interface: FmuInterface) -> FmuInterface:

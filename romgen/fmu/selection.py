@@ -19,8 +19,8 @@ def exported_model(model: ReducedModel, sensors: tuple[str, ...] | None) -> Redu
 
     Raises
     ------
-    InputError : for an unknown or no sensor, a name that is no C identifier, numbers that are not finite, a mode without
-        oscillation, or a mode that was never excited in training.
+    InputError : for an unknown or no sensor, a name that is no C identifier, numbers that are not finite, a mode
+        that does not oscillate, or one that was never excited in training.
     """
     _check_identifier(model.name)
     chosen = _with_sensors(model, model.sensors if sensors is None else sensors)
@@ -39,7 +39,9 @@ def exported_model(model: ReducedModel, sensors: tuple[str, ...] | None) -> Redu
         raise InputError("a mode does not oscillate", where=WHERE, value=chosen.eigenvalues)
     if not np.all(chosen.trained_amplitude > 0.0):
         advice = "add a training motion that excites every master mode"
-        raise InputError("a mode was never excited in training", where=WHERE, value=chosen.trained_amplitude, advice=advice)
+        raise InputError(
+            "a mode was never excited in training", where=WHERE, value=chosen.trained_amplitude, advice=advice
+        )
     return chosen
 
 

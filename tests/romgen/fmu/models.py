@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
@@ -12,18 +14,14 @@ SENSORS = ("lower", "mid span", "upper")
 
 
 def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "random_panel") -> ReducedModel:
-    """Two modes near 110 and 221 Hz with 0.4 % damping, terms of the 1:2 resonance, three sensors.
+    """Two modes near 110 and 221 Hz with 0.4 % damping, conservative terms of the 1:2 resonance, three sensors.
 
     Coefficients of degree d fall as 1/d!; amplitudes of order 1 are trained.
     """
     rng = np.random.default_rng(seed)
     omega = 2.0 * np.pi * np.array([110.0, 221.0])
     lam: ComplexArray = omega * (-0.004 + 1j * np.sqrt(1.0 - 0.004**2))
-    form = exponents(4, 2, order)
     real = exponents(4, 1, order)
-    resonant = np.stack([_is_resonant(form, 1), _is_resonant(form, 2)])
-    decay = _decay(form)
-    n = 60.0 * resonant * decay * (rng.standard_normal(resonant.shape) * 0.3 + 1j * rng.standard_normal(resonant.shape))
     chart = 0.05 * _decay(real) * _complex(rng, (4, len(real)))
     for j in range(2):
         chart[j, j] += 1.0
@@ -33,7 +31,7 @@ def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "r
     return ReducedModel(
         name=name,
         eigenvalues=lam,
-        normal_form=PolynomialMap(form[np.any(resonant, axis=0)], n[:, np.any(resonant, axis=0)]),
+        normal_form=_conservative_terms(rng, order),
         chart=PolynomialMap(real, chart),
         inverse_chart=PolynomialMap(real, _complex(rng, (2, len(real)))),
         scale=np.ones(4),
@@ -67,8 +65,23 @@ def smooth_input(n_time: int, step: float, n_input: int = 1, seed: int = 3) -> F
     return u
 
 
-def _is_resonant(e: np.ndarray[tuple[int, int], np.dtype[np.int64]], r: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return (e @ np.array([1, 2, -1, -2])) == r
+def _conservative_terms(rng: np.random.Generator, order: int) -> PolynomialMap[np.complex128]:
+    """N_j = i dH / d conj z_j for a random real H(z, conj z) invariant under (z_1, z_2) -> (e^ia z_1, e^2ia z_2).
+
+    Then |z_1|^2 + 2 |z_2|^2 is constant under N, so every motion with linear damping stays bounded.
+    """
+    table = exponents(4, 3, order + 1)
+    invariant = [tuple(e) for e in table[table @ np.array([1, 2, -1, -2]) == 0]]
+    h = {e: complex(*rng.standard_normal(2)) * 60.0 / math.factorial(sum(e) - 1) for e in invariant}
+    h = {e: h[e] + h[e[2:] + e[:2]].conjugate() for e in invariant}
+    terms: dict[tuple[int, ...], list[complex]] = {}
+    for e, c in h.items():
+        for j in range(2):
+            lowered = tuple(n - (i == 2 + j) for i, n in enumerate(e))
+            if e[2 + j]:
+                terms.setdefault(lowered, [0j, 0j])[j] += 1j * c * e[2 + j]
+    rows = sorted(terms, key=lambda e: (sum(e), e))
+    return PolynomialMap(np.array(rows, dtype=np.int64), np.array([terms[e] for e in rows]).T)
 
 
 def _decay(e: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> FloatArray:
