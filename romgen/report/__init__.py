@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from romgen.report.inputs import Reconstruction, ReportInputs, StageCost
+from romgen.report.inputs import OrderTrial, Reconstruction, ReportInputs, StageCost
 from romgen.report.write import ReportFiles, write_report
 
-__all__ = ["Reconstruction", "ReportFiles", "ReportInputs", "StageCost", "write_report"]
+__all__ = ["OrderTrial", "Reconstruction", "ReportFiles", "ReportInputs", "StageCost", "write_report"]

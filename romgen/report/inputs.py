@@ -55,6 +55,20 @@ class StageCost:
 
 
 @dataclass(frozen=True)
+class OrderTrial:
+    """One polynomial order that was tried: worst NMTE in percent over training and over held-out motions (nan: none).
+
+    ``chosen`` marks the order of the model; ``note`` says why an order was passed over.
+    """
+
+    order: int
+    training_percent: float
+    held_out_percent: float
+    chosen: bool
+    note: str = ""
+
+
+@dataclass(frozen=True)
 class ReportInputs:
     """Everything a report can show; only the name of the study is required.
 
@@ -66,6 +80,10 @@ class ReportInputs:
     ring_downs : the computed transients with their energies.
     reconstructions : recorded motions against the reduced model.
     model : the reduced model.
+    polar_form : the normal form in polar coordinates as text.
+    resonance_reason : one sentence on how the kept terms were chosen.
+    coefficient_deviation : (m, n_term) 1/s, standard deviation of abs of each normal-form coefficient.
+    orders : the polynomial orders that were tried.
     forced : frequency response at all levels.
     backbones : free vibration of the reduced model, one per mode and kind.
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
@@ -87,6 +105,10 @@ class ReportInputs:
     ring_downs: tuple[RingDown, ...] = ()
     reconstructions: tuple[Reconstruction, ...] = ()
     model: ReducedModel | None = None
+    polar_form: str = ""
+    resonance_reason: str = ""
+    coefficient_deviation: FloatArray | None = None
+    orders: tuple[OrderTrial, ...] = ()
     forced: ForcedResponse | None = None
     backbones: tuple[Backbone, ...] = ()
     sensor: str | None = None

@@ -15,6 +15,7 @@ from romgen.spectrogram import uniform_samples
 
 # Half width of the band of a mode relative to its frequency, and the least amplitude shown relative to the largest.
 _HALF_BAND, _LEAST = 0.2, 0.03
+_NEEDED_PERIODS = 15.0
 
 
 def mode_motion(t: FloatArray, x: FloatArray, frequency_hz: float) -> Instantaneous:
@@ -30,6 +31,12 @@ def mode_motion(t: FloatArray, x: FloatArray, frequency_hz: float) -> Instantane
     kept = motion.amplitude >= _LEAST * motion.amplitude.max()
     columns = (motion.t, motion.amplitude, motion.frequency_hz, motion.damping_ratio)
     return Instantaneous(*(column[kept] for column in columns))
+
+
+def long_enough(pair: Reconstruction, frequency_hz: FloatArray) -> bool:
+    """Whether anything is left once the band-pass of the lowest mode has lost five periods at both ends."""
+    t = pair.trajectory.t
+    return bool(t[-1] - t[0] > _NEEDED_PERIODS / ((1.0 - _HALF_BAND) * frequency_hz[0]))
 
 
 def strongest_sensor(pair: Reconstruction, frequency_hz: float) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 from romgen.arrays import FloatArray, IntArray
 from romgen.reduced_model import ReducedModel
 from romgen.report.blocks import TableBlock
+from romgen.report.inputs import OrderTrial
 
 _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -48,19 +49,19 @@ def detuning(model: ReducedModel, j: int, exponents: IntArray) -> complex:
     return complex(model.eigenvalues[j] - exponents @ spectrum)
 
 
-def coefficient_table(model: ReducedModel, standard_error: FloatArray | None) -> TableBlock:
+def coefficient_table(model: ReducedModel, deviation: FloatArray | None) -> TableBlock:
     """Nonlinear terms of the normal form: coefficient, its standard error, and how near the term is to resonance.
 
     Parameters
     ----------
     model : the reduced model.
-    standard_error : (m, n_term) of abs(coefficient) in 1/s, or None where it was not estimated.
+    deviation : (m, n_term) standard deviation of abs(coefficient) in 1/s, or None where it was not estimated.
     """
     values, rows = model.normal_form.coefficients, []
     for j, k in zip(*np.nonzero(values), strict=True):
         exponents = model.normal_form.exponents[k]
         coefficient = f"{values[j, k]:.5g}".strip("()")
-        error = () if standard_error is None else (f"{standard_error[j, k]:.2g}",)
+        error = () if deviation is None else (f"{deviation[j, k]:.2g}",)
         delta = abs(detuning(model, int(j), exponents))
         share = 100.0 * delta / abs(model.eigenvalues[j])
         rows.append(
@@ -73,10 +74,25 @@ def coefficient_table(model: ReducedModel, standard_error: FloatArray | None) ->
                 f"{share:.2f}",
             )
         )
-    errors = () if standard_error is None else ("standard error [1/s]",)
+    errors = () if deviation is None else ("standard error [1/s]",)
     header = ("row", "term", "coefficient [1/s]", *errors, "detuning [1/s]", "of |λ| [%]")
     caption = (
         "Nonlinear terms kept in the normal form. Detuning is |λⱼ - ⟨k, λ⟩|: terms near resonance cannot be "
         "transformed away and carry the nonlinear frequency, damping and energy exchange."
     )
     return TableBlock(caption, header, tuple(rows))
+
+
+def order_table(orders: tuple[OrderTrial, ...]) -> TableBlock:
+    """Error against polynomial order, and which one was taken."""
+    rows = tuple(
+        (
+            f"{trial.order}",
+            f"{trial.training_percent:.3f}",
+            f"{trial.held_out_percent:.3f}" if np.isfinite(trial.held_out_percent) else "not used",
+            "chosen" if trial.chosen else trial.note,
+        )
+        for trial in orders
+    )
+    caption = "Orders that were tried: worst NMTE over the motions of each kind."
+    return TableBlock(caption, ("order", "training [%]", "held out [%]", "verdict"), rows)

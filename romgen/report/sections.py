@@ -15,9 +15,9 @@ from romgen.report.cost_figures import cost_figure, cost_table
 from romgen.report.fmu_tables import check_table, export_table, problem_listing, replay_table
 from romgen.report.forced_figures import modal_figure, response_figure, response_table
 from romgen.report.inputs import ReportInputs
-from romgen.report.instantaneous_figures import instantaneous_figure
+from romgen.report.instantaneous_figures import instantaneous_figure, long_enough
 from romgen.report.mode_tables import frequency_table, ratio_table
-from romgen.report.model_tables import coefficient_table, spectrum_table
+from romgen.report.model_tables import coefficient_table, order_table, spectrum_table
 from romgen.report.ringdown_figures import energy_figure, energy_table, nmte_table, ringdown_figure
 from romgen.report.spectrogram_figures import spectrogram_figure
 from romgen.report.structure_figures import mesh_figure, mode_figure
@@ -95,16 +95,27 @@ def spectrogram_section(inputs: ReportInputs) -> Section | None:
     unseen = tuple(pair for pair in inputs.reconstructions if pair.role == "validation") or inputs.reconstructions
     frequency_hz = inputs.model.eigenvalues.imag / (2.0 * np.pi)
     maps = (spectrogram_figure(pair, frequency_hz, inputs.model.internal_resonance) for pair in unseen)
-    curves = (instantaneous_figure(pair, frequency_hz) for pair in unseen)
-    return Section("spectrogram", "Frequency content and damping of the decay", (*maps, *curves))
+    long = [pair for pair in unseen if long_enough(pair, frequency_hz)]
+    curves = (instantaneous_figure(pair, frequency_hz) for pair in long)
+    short = ", ".join(pair.trajectory.name for pair in unseen if not long_enough(pair, frequency_hz))
+    note = (TextBlock(f"Too short for instantaneous frequency and damping: {short}."),) if short else ()
+    return Section("spectrogram", "Frequency content and damping of the decay", (*maps, *curves, *note))
 
 
 def model_section(inputs: ReportInputs) -> Section | None:
     """The equations that were learned."""
     if inputs.model is None:
         return None
-    tables = (spectrum_table(inputs.model), coefficient_table(inputs.model, None))
-    return Section("model", "Reduced model", tables)
+    orders: tuple[Block, ...] = (order_table(inputs.orders),) if inputs.orders else ()
+    reason: tuple[Block, ...] = ()
+    if inputs.resonance_reason:
+        reason = (TextBlock(f"Terms were kept in the normal form by this rule: {inputs.resonance_reason}."),)
+    polar: tuple[Block, ...] = ()
+    if inputs.polar_form:
+        polar = (ListingBlock("Normal form in polar coordinates, zⱼ = ρⱼ exp(iθⱼ).", inputs.polar_form),)
+    coefficients = coefficient_table(inputs.model, inputs.coefficient_deviation)
+    blocks = (spectrum_table(inputs.model), *orders, *reason, *polar, coefficients)
+    return Section("model", "Reduced model", blocks)
 
 
 def forced_section(inputs: ReportInputs) -> Section | None:

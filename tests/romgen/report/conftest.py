@@ -14,7 +14,7 @@ from romgen.forced_response import forced_response
 from romgen.polynomial import PolynomialMap
 from romgen.provenance import collect_provenance
 from romgen.reduced_model import ReducedModel
-from romgen.report import Reconstruction, ReportInputs, StageCost
+from romgen.report import OrderTrial, Reconstruction, ReportInputs, StageCost
 from romgen.settings import ForcedResponseSettings
 from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, Structure
 from romgen.trajectory import Trajectory
@@ -188,24 +188,25 @@ def full_inputs(
 ) -> ReportInputs:
     """A study with every stage."""
     return ReportInputs(
-        "clamped_arch",
-        "Clamped arch",
-        structure,
-        preload,
-        modes,
-        ring_downs,
-        reconstructions,
-        model,
-        forced_response(model, ForcedResponseSettings(levels=(1.0, 2.0), sensor="mid")),
-        (backbone(model, 0), backbone(model, 0, slaved=True), backbone(model, 1)),
-        None,
-        "sqrt2_rms",
-        FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),
-        None,
-        FmuCheck((), 3.1e-12, 1e-12, 2e-12, 3.1e-12, (), 4e-10, 1e-4, 2000),
-        {"mixed": 2.93},
-        stages,
-        ("validation motion 'mixed' starts outside the trained range of mode 2",),
-        collect_provenance("0123456789abcdef", "{}", {"folds": 0}),
-        "romgen run models/clamped_arch/study.toml",
+        study="clamped_arch",
+        title="Clamped arch",
+        structure=structure,
+        preload=preload,
+        modes=modes,
+        ring_downs=ring_downs,
+        reconstructions=reconstructions,
+        model=model,
+        polar_form="rho_1' = -2.76 rho_1 - 20 rho_1^3\ntheta_1' = 689.3 - 900 rho_1^2",
+        resonance_reason="exact 1:2 combinations",
+        coefficient_deviation=0.01 * np.abs(model.normal_form.coefficients),
+        orders=(OrderTrial(3, 4.1, 6.0, False, "larger held-out error"), OrderTrial(5, 1.1, 2.9, True)),
+        forced=forced_response(model, ForcedResponseSettings(levels=(1.0, 2.0), sensor="mid")),
+        backbones=(backbone(model, 0), backbone(model, 0, slaved=True), backbone(model, 1)),
+        fmu_export=FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),
+        fmu_check=FmuCheck((), 3.1e-12, 1e-12, 2e-12, 3.1e-12, (), 4e-10, 1e-4, 2000),
+        fmu_replays={"mixed": 2.93},
+        stages=stages,
+        warnings=("validation motion 'mixed' starts outside the trained range of mode 2",),
+        provenance=collect_provenance("0123456789abcdef", "{}", {"folds": 0}),
+        command="romgen run models/clamped_arch/study.toml",
     )

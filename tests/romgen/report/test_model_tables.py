@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from romgen.reduced_model import ReducedModel
-from romgen.report.model_tables import coefficient_table, detuning, monomial_text, spectrum_table
+from romgen.report import OrderTrial
+from romgen.report.model_tables import coefficient_table, detuning, monomial_text, order_table, spectrum_table
 
 
 def test_monomials_are_written_out() -> None:
@@ -27,6 +28,13 @@ def test_only_kept_terms_are_listed(model: ReducedModel) -> None:
     with_errors = coefficient_table(model, np.full(model.normal_form.coefficients.shape, 0.25))
     assert with_errors.header[3] == "standard error [1/s]"
     assert {row[3] for row in with_errors.rows} == {"0.25"}
+
+
+def test_orders() -> None:
+    """The chosen order is named; a missing held-out error is said, not shown as a number."""
+    nan = float("nan")
+    rows = order_table((OrderTrial(3, 4.0, nan, False, "larger error"), OrderTrial(5, 1.5, 2.5, True))).rows
+    assert rows == (("3", "4.000", "not used", "larger error"), ("5", "1.500", "2.500", "chosen"))
 
 
 def test_spectrum(model: ReducedModel) -> None:

@@ -13,7 +13,7 @@ import pytest
 from romgen.report import ReportFiles, ReportInputs, write_report
 from romgen.report.blocks import FigureBlock, Section
 from romgen.report.curve_table import read_csv
-from romgen.report.sections import BUILDERS, sections
+from romgen.report.sections import BUILDERS, sections, spectrogram_section
 from romgen.report.style import house_style
 
 SIGNATURES = {".png": b"\x89PNG\r\n\x1a\n", ".svg": b"<?xml"}
@@ -121,6 +121,19 @@ def test_an_absent_stage_is_left_out(full_inputs: ReportInputs, built: tuple[Sec
     """Its section is there with the stage and gone without it."""
     place = [section.anchor for section in built].index(anchor)
     assert BUILDERS[place](replace(full_inputs, **ABSENT[anchor])) is None
+
+
+def test_a_short_record_says_what_is_missing(full_inputs: ReportInputs) -> None:
+    """Ten periods give a spectrogram but no instantaneous frequency; the section says so."""
+    pair = full_inputs.reconstructions[2]
+    motion = replace(pair.trajectory, t=pair.trajectory.t[:500], displacement=pair.trajectory.displacement[:500])
+    short = replace(
+        full_inputs, reconstructions=(replace(pair, trajectory=motion, displacement=pair.displacement[:500]),)
+    )
+    with house_style():
+        section = spectrogram_section(short)
+    assert section is not None
+    assert [type(block).__name__ for block in section.blocks] == ["FigureBlock", "TextBlock"]
 
 
 def test_a_bare_study_still_has_a_page(tmp_path: Path) -> None:
