@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
+from fem.errors import FemInputError
 from fem.modes import ModalBasis
 from fem.motion import MotionState, StepRecord
 from fem.preload import Progress, StaticState
@@ -110,37 +111,64 @@ def march_campaign(
 ) -> Iterator[CampaignSegment]:
     """Yield the segments that are missing up to step ``n_step``, from ``starts`` or from the state of the last segment.
 
-    Every segment begins with an empty acceleration history, so that a resumed campaign repeats the same numbers bit by
-    bit.
+    Nothing but the state passes from one segment to the next, so that a resumed campaign repeats the same numbers bit
+    by bit.
     """
-    if restart is None:
-        if starts is None:
-            raise ValueError("a campaign needs starts or a restart state")
-        state = transient.start(starts.displacement, np.zeros_like(starts.displacement), starts.slip)
-        head = [transient.observe(state)]
+    rows: list[_Row] = []
+    if restart is not None:
+        state = restart
     else:
-        state, head = restart, []
+        if starts is None:
+            raise FemInputError("a campaign needs starts or a restart state", where="campaign")
+        state = transient.start(starts.displacement, np.zeros_like(starts.displacement), starts.slip)
+        rows.append(_observe(transient.observe(state), transient, observation))
     while state.step < n_step:
-        records = [*head, *transient.march(state, min(segment_steps, n_step - state.step))]
-        state, head = records[-1].state, []
-        yield _segment(records, transient, observation)
+        for record in transient.march(state, min(segment_steps, n_step - state.step)):
+            rows.append(_observe(record, transient, observation))
+            state = record.state
+        yield _segment(rows, state)
+        rows = []
 
 
-def _segment(records: list[StepRecord], transient: Transient, observation: Observation) -> CampaignSegment:
-    rest = transient.equilibrium.u[:, None]
-    modes, sensors = observation.modes, observation.sensors
-    moved = [r.state.u - rest for r in records]
-    kept = [i for i, r in enumerate(records) if r.state.step % observation.stride == 0]
+@dataclass(frozen=True)
+class _Row:
+    """One step of a segment; the large state of the step is not kept."""
+
+    step: int
+    fields: tuple[FloatArray, ...]
+    snapshot: npt.NDArray[np.float32] | None
+
+
+def _observe(record: StepRecord, transient: Transient, observation: Observation) -> _Row:
+    modes, sensors, state = observation.modes, observation.sensors, record.state
+    moved = state.u - transient.equilibrium.u[:, None]
+    fields = (
+        modes.left.T @ moved,
+        modes.left.T @ state.v,
+        modes.shapes.T @ record.net_force,
+        sensors @ moved,
+        sensors @ state.v,
+        np.concatenate([record.energies, state.work]),
+        record.iterations,
+    )
+    kept = state.step % observation.stride == 0
+    return _Row(state.step, fields, moved.astype(np.float32) if kept else None)
+
+
+def _segment(rows: list[_Row], state: MotionState) -> CampaignSegment:
+    columns = [np.stack(column) for column in zip(*(row.fields for row in rows), strict=True)]
+    eta, eta_dot, eta_ddot, displacement, velocity, energies, iterations = columns
+    snapshots = [row.snapshot for row in rows if row.snapshot is not None]
     return CampaignSegment(
-        steps=np.array([r.state.step for r in records], dtype=np.int64),
-        eta=np.stack([modes.left.T @ q for q in moved]),
-        eta_dot=np.stack([modes.left.T @ r.state.v for r in records]),
-        eta_ddot=np.stack([modes.shapes.T @ r.net_force for r in records]),
-        displacement=np.stack([sensors @ q for q in moved]),
-        velocity=np.stack([sensors @ r.state.v for r in records]),
-        energies=np.stack([np.concatenate([r.energies, r.state.work]) for r in records]),
-        iterations=np.stack([r.iterations for r in records]),
-        snapshots=np.array([moved[i] for i in kept], dtype=np.float32).reshape(len(kept), *rest.shape[:1], -1),
-        snapshot_steps=np.array([records[i].state.step for i in kept], dtype=np.int64),
-        state=records[-1].state,
+        steps=np.array([row.step for row in rows], dtype=np.int64),
+        eta=eta,
+        eta_dot=eta_dot,
+        eta_ddot=eta_ddot,
+        displacement=displacement,
+        velocity=velocity,
+        energies=energies,
+        iterations=iterations.astype(np.int64),
+        snapshots=np.array(snapshots, dtype=np.float32).reshape(len(snapshots), *state.u.shape),
+        snapshot_steps=np.array([row.step for row in rows if row.snapshot is not None], dtype=np.int64),
+        state=state,
     )

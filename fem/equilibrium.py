@@ -15,9 +15,9 @@ from fem.model import AXES, Model
 class InterfaceState:
     """One contact pair at one state.
 
-    ``point`` selects its points among all contact points; pressure, gap (n,) and traction (n, 2) in SI units; status (n,);
-    ``normal_force`` is the resultant of the pressure and ``applied_force`` what the loads send through the pair, nan where
-    supports on both sides leave that open; ``contact_area`` is the area of the closed points.
+    ``point`` selects its points among all contact points; pressure, gap (n,) and traction (n, 2) in SI units; status
+    (n,); ``normal_force`` is the resultant of the pressure and ``applied_force`` what the loads send through the pair,
+    nan where supports on both sides leave that open; ``contact_area`` is the area of the closed points.
     """
 
     name: str
@@ -60,8 +60,8 @@ def interface_states(model: Model, u: FloatArray, state: ContactState, case: int
 def applied_force(model: Model, pair: int) -> float:
     """Resultant in N that the clamping loads press through a pair, along its mean normal; nan where supports share it.
 
-    Without this pair the bodies fall into groups; the group of the slave or of the master that no support holds along the
-    normal passes all its load on to the pair.
+    Without this pair the bodies fall into groups; the group of the slave or of the master that no support holds along
+    the normal passes all its load on to the pair.
     """
     normal = _mean_normal(model, pair)
     definition = model.pairs[pair]
