@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -135,7 +136,7 @@ class _Row:
     """One step of a segment; the large state of the step is not kept."""
 
     step: int
-    fields: tuple[FloatArray, ...]
+    fields: tuple[npt.NDArray[Any], ...]
     snapshot: npt.NDArray[np.float32] | None
 
 
