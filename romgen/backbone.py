@@ -78,25 +78,29 @@ def backbone(model: ReducedModel, mode: int = 0, slaved: bool = False, rho: Floa
         rho = model.trained_amplitude[mode] * np.arange(1, POINTS + 1) / POINTS
     if rho.size == 0 or rho[0] <= 0.0 or np.any(np.diff(rho) <= 0.0):
         raise InputError("amplitudes must be positive and ascending", where=f"backbone of {model.name}", value=rho)
-    terms, notes = _terms(model)
-    q = np.zeros((rho.size, m), dtype=np.complex128)
-    q[:, mode] = rho
-    if slaved:
-        reached = _slave(_Locking(model.eigenvalues, terms, _locked_rotation(model, mode), mode), q)
-        if reached < rho.size:
-            notes += (
-                f"the phase-locked branch ends at rho = {rho[reached - 1]:.4g}" if reached else "no locked branch",
-            )
-        q = q[:reached]
-    return _record(model, terms, q, mode, slaved, notes)
+    q, rate = normal_motion(model, mode, slaved, rho)
+    notes = _notes(model)
+    if len(q) < rho.size:
+        notes += (f"no phase-locked motion was found at rho = {rho[len(q)]:.4g} and above",)
+    return _record(model, q, rate, slaved, (mode, notes))
 
 
-def uncoupled_frequency(model: ReducedModel, mode: int, rho: FloatArray) -> FloatArray:
-    """Return theta' (n,) in rad/s at amplitudes rho (n,) > 0 with the other modes zero."""
-    terms, _ = _terms(model)
+def normal_motion(model: ReducedModel, mode: int, slaved: bool, rho: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return all modes q (n, m) of the backbone at ascending amplitudes rho, and rho'/rho + i theta' (n,) in 1/s.
+
+    Fewer rows than rho where the phase-locked motion ends.
+
+    Raises
+    ------
+    InputError : rotations that cannot lock.
+    """
+    terms = _terms(model)
     q = np.zeros((rho.size, model.eigenvalues.size), dtype=np.complex128)
     q[:, mode] = rho
-    return _rates(model.eigenvalues, terms, q, mode).imag
+    if slaved:
+        q = q[: _slave(_Locking(model.eigenvalues, terms, _locked_rotation(model, mode), mode), q)]
+    values = np.array([point_terms(terms, row)[0][mode] for row in q], dtype=np.complex128)
+    return q, np.asarray(model.eigenvalues[mode] + values / q[:, mode])
 
 
 @dataclass(frozen=True)
@@ -153,30 +157,23 @@ def _locked_rotation(model: ReducedModel, mode: int) -> FloatArray:
     return np.asarray(r / r[mode])
 
 
-def _terms(model: ReducedModel) -> tuple[PolynomialMap[np.complex128], tuple[str, ...]]:
-    """Return the resonant terms and a note on those that average out over a period."""
+def _terms(model: ReducedModel) -> PolynomialMap[np.complex128]:
+    """Return the resonant terms; the others average out over a period."""
     kept = resonant_terms(model.normal_form.exponents, rotations(model))
-    dropped = int(np.count_nonzero(~kept & (model.normal_form.coefficients != 0.0)))
-    notes = (f"{dropped} non-resonant terms of the normal form do not enter the backbone",) if dropped else ()
-    return PolynomialMap(model.normal_form.exponents, np.where(kept, model.normal_form.coefficients, 0.0)), notes
+    return PolynomialMap(model.normal_form.exponents, np.where(kept, model.normal_form.coefficients, 0.0))
 
 
-def _rates(eigenvalues: ComplexArray, terms: PolynomialMap[np.complex128], q: ComplexArray, mode: int) -> ComplexArray:
-    """Return n_mode / q_mode (n,) = rho'/rho + i theta'."""
-    values = np.array([point_terms(terms, row)[0][mode] for row in q], dtype=np.complex128)
-    return np.asarray(eigenvalues[mode] + values / q[:, mode])
+def _notes(model: ReducedModel) -> tuple[str, ...]:
+    """Say how many terms are not resonant."""
+    dropped = np.count_nonzero(model.normal_form.coefficients) - np.count_nonzero(_terms(model).coefficients)
+    return (f"{dropped} non-resonant terms of the normal form do not enter the backbone",) if dropped else ()
 
 
 def _record(
-    model: ReducedModel,
-    terms: PolynomialMap[np.complex128],
-    q: ComplexArray,
-    mode: int,
-    slaved: bool,
-    notes: tuple[str, ...],
+    model: ReducedModel, q: ComplexArray, rate: ComplexArray, slaved: bool, of: tuple[int, tuple[str, ...]]
 ) -> Backbone:
-    """Evaluate frequency, damping and amplitudes along q (n, m)."""
-    rate = _rates(model.eigenvalues, terms, q, mode)
+    """Evaluate frequency, damping and amplitudes along q (n, m); ``of`` is the mode and the notes."""
+    mode, notes = of
     r = rotations(model)
     ratio = r / r[mode] if slaved else np.ones(r.size)
     phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES

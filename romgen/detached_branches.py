@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,7 @@ from romgen.forced_curve import ForcedSystem
 # Two solutions are the same where they differ by less than this share of the state scale.
 SAME = 1e-5
 MOST_BRANCHES = 8
+SEARCH_ITERATIONS = 15
 
 
 def detached_branches(
@@ -31,16 +33,17 @@ def detached_branches(
     ----------
     known : branches already followed.
     starts : guesses (state x, Omega in rad/s).
-    largest : (m,) solutions with abs(q_j) beyond it are not followed: the model was not trained there.
+    largest : (m,) solutions outside the ellipsoid sum_j abs(q_j / largest_j)^2 = 1 are not followed: the model was not
+        trained on such amplitudes together.
     settings : of the continuation, also of the Newton iterations.
     """
     found: list[Branch] = []
     for start, omega in starts:
         try:
-            x = solve_at(system, start, omega, settings)
+            x = solve_at(system, start, omega, replace(settings, iterations=SEARCH_ITERATIONS))
         except NumericalError:  # most random starts lead nowhere; only solutions count
             continue
-        if np.any(np.abs(system.modal(x[None])[0]) > largest):
+        if np.linalg.norm(system.modal(x[None])[0] / largest) > 1.0:
             continue
         if any(_holds(system, branch, x, omega, settings) for branch in [*known, *found]):
             continue

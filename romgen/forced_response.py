@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from romgen.arrays import ComplexArray
-from romgen.backbone import uncoupled_frequency
+from romgen.arrays import ComplexArray, FloatArray
+from romgen.backbone import normal_motion
 from romgen.branch import Branch, ContinuationSettings
 from romgen.continuation import continue_branch
 from romgen.detached_branches import crossing_starts, detached_branches, random_starts
@@ -25,6 +25,9 @@ LIMIT = 1.5
 # Half-bandwidths abs(Re lambda) added to the automatic range on both sides, and its least half-width.
 MARGIN, LEAST_WIDTH = 12.0, 0.03
 SEARCH_FREQUENCIES, SEARCH_TRIES = 7, 12
+BACKBONE_POINTS = 80
+
+Motion = tuple[ComplexArray, ComplexArray, FloatArray]
 
 
 def forced_response(model: ReducedModel, settings: ForcedResponseSettings) -> ForcedResponse:
@@ -54,10 +57,10 @@ def forced_response(model: ReducedModel, settings: ForcedResponseSettings) -> Fo
     range_hz = settings.frequency_range_hz or _automatic_range(model, highest, mode)
     sensor = model.sensors.index(settings.sensor) if settings.sensor else 0
     unit = model.input_units[model.inputs.index(settings.input)]
-    curves: list[ForcedCurve] = []
+    curves, motions = list[ForcedCurve](), _motions(model, mode)
     for level in settings.levels:
         observed = Observation(settings.input, unit, level, mode, sensor, settings.measure)
-        curves += _curves_of_level(model, range_hz, observed)
+        curves += _curves_of_level(model, range_hz, observed, motions)
     frame = rotating_frame(model, highest, mode)
     return ForcedResponse(
         curves=tuple(curves),
@@ -86,7 +89,9 @@ def _all_resonant(frame: RotatingFrame) -> bool:
     return not np.any(frame.dropped_terms > 0.0)
 
 
-def _curves_of_level(model: ReducedModel, range_hz: tuple[float, float], observed: Observation) -> list[ForcedCurve]:
+def _curves_of_level(
+    model: ReducedModel, range_hz: tuple[float, float], observed: Observation, motions: list[Motion]
+) -> list[ForcedCurve]:
     """Follow the main branch and all further ones at one level."""
     load = harmonic_load(model, observed.input, observed.level)
     system = forced_system(model, load, observed.forced_mode)
@@ -94,7 +99,8 @@ def _curves_of_level(model: ReducedModel, range_hz: tuple[float, float], observe
     settings = _continuation(model, load, observed.forced_mode, (lower, upper))
     main = _main_branch(system, settings, observed.level)
     guesses = [(system.linear_response(omega), omega) for omega in (lower, upper)]
-    guesses += _ridge_starts(model, observed.forced_mode, (lower, upper))
+    ridge = _ridge_starts(motions, observed.forced_mode, load)
+    guesses += [(q, omega) for q, omega in ridge if lower < omega < upper]
     guesses += random_starts(model.trained_amplitude, (lower, upper), SEARCH_FREQUENCIES, SEARCH_TRIES)
     starts = crossing_starts(system, [main], settings)
     starts += [(system.start(q, omega), omega) for q, omega in guesses]
@@ -159,21 +165,37 @@ def _automatic_range(model: ReducedModel, load: ComplexArray, mode: int) -> tupl
     """Return in Hz the frequencies of the backbone up to the linear peak or the trained amplitude, and a margin."""
     eigenvalue = model.eigenvalues[mode]
     largest = min(abs(load[mode] / eigenvalue.real), float(model.trained_amplitude[mode]))
-    omega = np.append(uncoupled_frequency(model, mode, largest * np.linspace(0.02, 1.0, 50)), eigenvalue.imag)
+    _, rate = normal_motion(model, mode, False, largest * np.linspace(0.02, 1.0, 50))
+    omega = np.append(rate.imag, eigenvalue.imag)
     margin = float(max(MARGIN * abs(eigenvalue.real), LEAST_WIDTH * eigenvalue.imag))
     lower = max(float(omega.min()) - margin, 0.2 * float(eigenvalue.imag))
     return lower / (2.0 * np.pi), float(omega.max() + margin) / (2.0 * np.pi)
 
 
-def _ridge_starts(model: ReducedModel, mode: int, omega_range: tuple[float, float]) -> list[tuple[ComplexArray, float]]:
-    """Return guesses on the backbone, in four phases: isolas of weakly damped modes lie around it."""
-    rho = model.trained_amplitude[mode] * np.linspace(0.1, 1.0, 8)
+def _ridge_starts(motions: list[Motion], mode: int, load: ComplexArray) -> list[tuple[ComplexArray, float]]:
+    """Return the phase-resonant guesses of one level: on a backbone, where the damping force equals the load.
+
+    q_mode = rho f / abs(f) with -Re(n_mode / q_mode) rho = abs(f); every isola around a backbone holds two of them.
+    """
     starts: list[tuple[ComplexArray, float]] = []
-    for amplitude, omega in zip(rho, uncoupled_frequency(model, mode, rho), strict=True):
-        if omega_range[0] <= omega <= omega_range[1]:
-            q = np.outer([1.0, 1j, -1.0, -1j], np.eye(model.eigenvalues.size)[mode] * amplitude)
-            starts += [(row, float(omega)) for row in q]
+    size, direction = float(np.abs(load[mode])), np.angle(load[mode])
+    for q, rate, ratio in motions:
+        rho = np.abs(q[:, mode])
+        surplus = -rate.real * rho - size
+        for i in np.flatnonzero(surplus[:-1] * surplus[1:] < 0.0):
+            share = surplus[i] / (surplus[i] - surplus[i + 1])
+            point = (1.0 - share) * q[i] + share * q[i + 1]
+            omega = (1.0 - share) * rate[i].imag + share * rate[i + 1].imag
+            starts.append((np.asarray(point * np.exp(1j * ratio * direction)), float(omega)))
     return starts
+
+
+def _motions(model: ReducedModel, mode: int) -> list[Motion]:
+    """Return the backbones of the driven mode, the others zero and, where they can lock, slaved; r_k / r_mode each."""
+    rho = float(model.trained_amplitude[mode]) * np.linspace(0.01, 1.0, BACKBONE_POINTS)
+    ratio = rotations(model) / rotations(model)[mode]
+    can_lock = len(model.internal_resonance) > 1 and not np.any(ratio % 1.0)
+    return [(*normal_motion(model, mode, slaved, rho), ratio) for slaved in ((False, True) if can_lock else (False,))]
 
 
 def _check(model: ReducedModel, settings: ForcedResponseSettings) -> None:
