@@ -110,8 +110,8 @@ def energy_figure(ring_down: RingDown) -> FigureBlock:
     )
     _draw_stack(top, t, parts)
     top.plot(t, 1e3 * budget, color=BLACK, linewidth=1.0, linestyle="--", label="initial + external work")
-    top.legend(loc="lower center", bbox_to_anchor=(0.62, 1.0), ncols=4)
-    label(top, "", "energy [mJ]", f"{name}: where the energy goes")
+    top.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, columnspacing=1.2, handlelength=1.4)
+    label(top, "", "energy [mJ]", name)
     percent = 100.0 * ledger.imbalance / np.abs(budget).max()
     bottom.plot(t, percent, color=VERMILLION, linewidth=0.9)
     label(
