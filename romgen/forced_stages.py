@@ -18,7 +18,7 @@ class Backbones:
 
     Attributes
     ----------
-    curves : each mode with the others at zero, then, with an internal resonance, each with the others slaved to it.
+    curves : each mode with the others at zero, then those that the others can lock to.
     """
 
     curves: tuple[Backbone, ...]
@@ -42,6 +42,8 @@ def compute_backbones(context: Context) -> Backbones:
     model = learned_model(context)
     modes = range(len(model.eigenvalues))
     curves = [backbone(model, mode) for mode in modes]
-    if model.internal_resonance:
-        curves += [backbone(model, mode, slaved=True) for mode in modes]
+    r = model.internal_resonance
+    # The others lock only to a mode whose integer divides all others: in 1:2 to the first mode, not to the second.
+    locking = [mode for mode in modes if r and all(other % r[mode] == 0 for other in r)]
+    curves += [backbone(model, mode, slaved=True) for mode in locking]
     return Backbones(tuple(curves))
