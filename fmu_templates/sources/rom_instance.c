@@ -163,7 +163,9 @@ int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value
 
 void rom_set_real(rom_instance *s, fmi2ValueReference vr, double value)
 {
-    rom_invalidate(s);
+    s->rate_is_valid = 0;
+    if (vr < VR_RATE)
+        s->output_is_valid = 0; /* no output depends on an input */
     if (vr < VR_RATE && vr % 2 == 0)
         s->memory.z[vr / 2].re = value;
     else if (vr < VR_RATE)

@@ -84,7 +84,7 @@ fmi2Status rom_refuse(const rom_instance *s, const char *function, const char *r
 /* Logs why a computation failed and enters the error mode; the state is the last good one. */
 fmi2Status rom_fail(rom_instance *s, const char *function, const char *reason);
 
-/* Forgets computed values after a change of state, input or parameter. */
+/* Forgets all computed values, after a change of the state. */
 void rom_invalidate(rom_instance *s);
 
 void rom_update_rate(rom_instance *s);
