@@ -180,9 +180,12 @@ def join(x: FloatArray) -> ComplexArray:
 
 
 def real_jacobian(by_q: ComplexArray, by_conjugate: ComplexArray) -> FloatArray:
-    """Return the (2m, 2m) Jacobian by (Re q, Im q) of dF = by_q dq + by_conjugate conj(dq)."""
+    """Return the real Jacobian (2m, 2n) by (Re q, Im q) of dF = by_q dq + by_conjugate conj(dq), both (m, n)."""
+    m, n = by_q.shape
     plus, minus = by_q + by_conjugate, by_q - by_conjugate
-    return np.block([[plus.real, -minus.imag], [plus.imag, minus.real]])
+    J = np.empty((2 * m, 2 * n))
+    J[:m, :n], J[:m, n:], J[m:, :n], J[m:, n:] = plus.real, -minus.imag, plus.imag, minus.real
+    return J
 
 
 def _dropped_share(model: ReducedModel, kept: BoolArray) -> FloatArray:
