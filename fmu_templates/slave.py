@@ -72,7 +72,7 @@ class RomgenSlave(Fmi2Slave):
 
     def _read_model(self, model: dict[str, Any]) -> None:
         def complex_array(key: str) -> np.ndarray:
-            pairs = np.array(model[key], dtype=float)
+            pairs = np.array(model[key], dtype=float).reshape(-1, 2)  # also for a matrix without columns
             return pairs[..., 0] + 1j * pairs[..., 1]
 
         self.eigenvalues = complex_array("eigenvalues_per_s")
