@@ -158,18 +158,30 @@ def _follow(curve: _Curve, start: _Point) -> tuple[list[_Point], End]:
         if trial is None:
             h *= factor
             continue
-        distance = float(np.linalg.norm(trial.v - start.v))
-        farthest = max(farthest, distance)
-        if distance < trial.step < 0.3 * farthest and trial.tangent @ start.tangent > 0.5:
-            return [*points, *_located(curve, here, trial), start], "closed"
-        p, (lower, upper) = float(trial.v[-1] * curve.scale[-1]), s.parameter_range
-        if not lower <= p <= upper:
-            return [*points, *_to_bound(curve, here, trial, lower if p < lower else upper)], "range"
-        points += [*_located(curve, here, trial), trial]
-        if np.max(np.abs(trial.v[:-1])) * s.state_scale > s.state_limit:
-            return points, "limit"
+        farthest = max(farthest, float(np.linalg.norm(trial.v - start.v)))
+        try:
+            piece, end = _piece(curve, (start, here, trial), farthest)
+        except NumericalError:  # a special point or the bound could not be located within this step: take a shorter one
+            h *= 0.5
+            continue
+        points += piece
+        if end is not None:
+            return points, end
         here, h = trial, min(h * factor, s.largest_step)
     return points, "points"
+
+
+def _piece(curve: _Curve, along: tuple[_Point, _Point, _Point], farthest: float) -> tuple[list[_Point], End | None]:
+    """Return the points that the step from ``here`` to ``trial`` adds, and why the branch ends there, if it does."""
+    start, here, trial = along
+    s = curve.settings
+    if np.linalg.norm(trial.v - start.v) < trial.step < 0.3 * farthest and trial.tangent @ start.tangent > 0.5:
+        return [*_located(curve, here, trial), start], "closed"
+    p, (lower, upper) = float(trial.v[-1] * curve.scale[-1]), s.parameter_range
+    if not lower <= p <= upper:
+        return _to_bound(curve, here, trial, lower if p < lower else upper), "range"
+    beyond = np.max(np.abs(trial.v[:-1])) * s.state_scale > s.state_limit
+    return [*_located(curve, here, trial), trial], "limit" if beyond else None
 
 
 def _trial(curve: _Curve, here: _Point, h: float) -> tuple[_Point | None, float]:

@@ -37,6 +37,19 @@ def test_linear_oscillator_has_the_transfer_function() -> None:
     assert TWO_PI * curve.peak_hz == pytest.approx(np.sqrt(1.0 - 2e-4), abs=1e-4)
 
 
+def test_two_modes_without_internal_resonance_answer_together() -> None:
+    """r = (1, 1): the load drives both rows and nothing is left to a correction."""
+    eigenvalues = np.array([-0.01 + 1j, -0.01 + 1.3j])
+    load = np.array([-0.5j, -0.2j])
+    none = PolynomialMap(np.array([[2, 0, 1, 0]]), np.zeros((2, 1), dtype=np.complex128))
+    model = linear_charts(eigenvalues, none, load)
+    settings = ForcedResponseSettings(input="load", levels=(0.02,), sensor="x2", frequency_range_hz=(0.14, 0.23))
+    (curve,) = forced_response(model, settings).curves
+    s = 2j * np.pi * curve.frequency_hz[:, None]
+    exact = 0.02 * np.abs(load / (s - eigenvalues) + load.conj() / (s - eigenvalues.conj()))
+    np.testing.assert_allclose(curve.amplitude_sqrt2_rms, exact, rtol=1e-9)
+
+
 def test_damping_along_the_curve_is_that_of_the_normal_form() -> None:
     """-Re(n / q) / Omega with n / q = lambda + gamma abs(q)^2."""
     model = averaged_oscillator(-0.01 + 0.05j, damping=0.02)
