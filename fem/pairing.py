@@ -70,29 +70,42 @@ def surface_points(points: FloatArray, facets: IntArray) -> SurfacePoints:
 def project(points: FloatArray, targets: FloatArray, facets: IntArray, reach: float) -> Projection:
     """Closest points of ``targets`` (n_target, 3) on facets over nodes at ``points``.
 
-    Newton on (x(xi) - x_t) . dx/dxi = 0 for the nearest facets of every target; a projection counts when xi lies in the
-    facet and its distance is at most ``reach`` (m). Wriggers, Computational Contact Mechanics, sec. 4.1.
+    Newton on (x(xi) - x_t) . dx/dxi = 0 for every facet that may come within ``reach`` (m) of a target; a projection
+    counts when xi lies in the facet and its distance is at most ``reach``. Wriggers, Computational Contact Mechanics,
+    sec. 4.1.
     """
     reference = face_element(facets)
-    centre = points[facets].mean(axis=1)
-    k = min(9, len(facets))
-    _, candidates = cKDTree(centre).query(targets, k=k)
-    candidates = np.asarray(candidates).reshape(len(targets), k)
-    best = np.full(len(targets), np.inf)
+    target, facet = _candidates(points[facets], targets, reach)
+    local = _closest(reference, points[facets[facet]], targets[target])
+    n, _ = reference.shape(local)
+    distance = np.linalg.norm(np.einsum("ta,tai->ti", n, points[facets[facet]]) - targets[target], axis=1)
+    usable = np.flatnonzero(_inside(reference, local) & (distance <= reach))
+    # Nearest first; of equally near facets (a shared edge) the lower number, so that the choice is reproducible.
+    order = usable[np.lexsort((facet[usable], distance[usable], target[usable]))]
+    found, first = np.unique(target[order], return_index=True)
     chosen = np.zeros(len(targets), dtype=np.int64)
     xi = np.zeros((len(targets), 2))
-    for column in candidates.T:
-        local = _closest(reference, points[facets[column]], targets)
-        n, _ = reference.shape(local)
-        distance = np.linalg.norm(np.einsum("ta,tai->ti", n, points[facets[column]]) - targets, axis=1)
-        better = _inside(reference, local) & (distance <= reach) & (distance < best)
-        best[better], chosen[better], xi[better] = distance[better], column[better], local[better]
+    chosen[found], xi[found] = facet[order[first]], local[order[first]]
+    is_found = np.zeros(len(targets), dtype=bool)
+    is_found[found] = True
     n, dn = reference.shape(xi)
     corner = points[facets[chosen]]
     tangents = np.einsum("tad,tai->dti", dn, corner)
     normal = np.cross(tangents[0], tangents[1])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return Projection(np.einsum("ta,tai->ti", n, corner), normal, facets[chosen], n, np.isfinite(best))
+    return Projection(np.einsum("ta,tai->ti", n, corner), normal, facets[chosen], n, is_found)
+
+
+def _candidates(corner: FloatArray, targets: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
+    """Target and facet numbers of all pairs that may be within ``reach``: bounding spheres of the facets (n_facet, ...).
+
+    Quadratic facets bulge out of their nodes by less than their half size, hence the sphere of twice the node radius.
+    """
+    centre = corner.mean(axis=1)
+    radius = 2.0 * np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
+    near = cKDTree(targets).query_ball_point(centre, radius + reach)
+    facet = np.repeat(np.arange(len(corner)), [len(found) for found in near])
+    return np.concatenate([np.empty(0), *near]).astype(np.int64), facet.astype(np.int64)
 
 
 def _closest(reference: ReferenceElement, corner: FloatArray, targets: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ import ctypes
 import time
 import weakref
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ class Pardiso:
     def __init__(self, *, symmetric: bool, single: bool = False) -> None:
         self._mtype = _SPD if symmetric else _UNSYMMETRIC
         self._dtype: Any = np.float32 if single else np.float64
-        self._handle = _Handle(PyPardisoSolver()._mkl_pardiso, self._mtype)
+        self._handle = _Handle(_mkl(), self._mtype)
         self._handle.iparm[27] = int(single)
         if not symmetric:
             self._handle.iparm[[10, 12]] = 1, 1
@@ -80,6 +81,13 @@ class Pardiso:
         if error:
             advice = "the matrix is singular or indefinite: look for an unconstrained or loose body"
             raise FemConvergenceError("direct solver failed", where=f"pardiso {key}", value=error, advice=advice)
+
+
+@cache
+def _mkl() -> Callable[..., None]:
+    """MKL's pardiso; finding the library searches the whole environment, so once per process."""
+    function: Callable[..., None] = PyPardisoSolver()._mkl_pardiso
+    return function
 
 
 class _Handle:

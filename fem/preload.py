@@ -12,6 +12,7 @@ from fem.contact import ContactState
 from fem.errors import FemConvergenceError
 from fem.linear_solver import make_solver
 from fem.model import Model
+from fem.rigid_motion import check_restraint
 
 Progress = Callable[[float], None]
 
@@ -61,12 +62,15 @@ def solve_static(
     Raises
     ------
     FemConvergenceError : with the residual history; what converged before is in ``last_good`` of the error.
+    FemInputError : a body that nothing holds.
     """
+    check_restraint(model)
     n_case = 1
     u = np.zeros(model.n_dof) if start is None else start.u
     slip = model.contact.no_slip(n_case) if start is None else start.contact.slip
     first = np.zeros(model.n_dof) if start is None else _internal(model, u, slip)[0]
-    scale = float(np.linalg.norm((load - first)[model.free])) or 1.0
+    # Not the change alone: a start that is already in balance would ask for a residual below roundoff.
+    scale = max(float(np.linalg.norm(force[model.free])) for force in (load, first)) or 1.0
     factors: list[float] = []
     history: list[float] = []
     state = model.contact.evaluate(model.contact.relative(u[:, None]), slip)

@@ -33,6 +33,8 @@ def sensor_rows(model: Model, sensors: Sequence[Sensor]) -> FloatArray:
     """
     rows = np.zeros((len(sensors), model.n_dof))
     for row, sensor in zip(rows, sensors, strict=True):
+        if sensor.direction not in AXES:
+            raise FemInputError("unknown direction", where=f"sensor {sensor.name}", value=sensor.direction)
         found = [_locate(body, np.array(sensor.point)) for body in model.bodies]
         outside, nodes, shape = min(
             ((miss, n + offset, s) for (miss, n, s), offset in zip(found, model.offsets, strict=True)),
