@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
-from romgen.errors import AcceptanceError
 from romgen.fmu.driver import Hold, fmpy_problems, replay
 from romgen.fmu.records import FmuCheck, FmuReplay
 from romgen.fmu.selection import exported_model
@@ -15,14 +14,14 @@ from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
 from romgen.simulate import sensors, simulate
 
-NATIVE_LIMIT = 1e-9
-"""Largest relative difference of the native unit; the algorithms are equal, so round-off (1e-12) is expected."""
-
 N_STEP = 2000
 START_FRACTION = 0.5
 """Start of the free run and target of the forced runs, in trained amplitudes."""
 
 SEED = 20140801
+
+STILL_FRACTION = 1e-6
+"""Share of the largest motion below which a state or sensor counts as standing still."""
 
 
 def check_fmu(
@@ -36,8 +35,8 @@ def check_fmu(
 ) -> FmuCheck:
     """Compare exported units with the Python model under the same input treatment, through fmpy.
 
-    Runs: free from a start state; forced by random sines with the input held in each step; forced with the input linear
-    in each step (native only, pythonfmu units have no input derivatives).
+    Runs: free from a start state; from rest under random sines with the input held in each step; the same with the
+    input linear in each step (native only, pythonfmu units have no input derivatives).
 
     Parameters
     ----------
@@ -47,25 +46,28 @@ def check_fmu(
     n_step : communication steps of each run.
     z0 : (m,) start state of the free run, default half the trained amplitudes.
 
+    Returns
+    -------
+    The measured differences; the algorithms are equal, so round-off (1e-12 or less) is expected of both units.
+
     Raises
     ------
-    AcceptanceError : when the native unit differs by more than 1e-9.
+    InputError : when a unit has no binary for this machine.
+    NumericalError : when a unit or the Python model fails on the way.
     """
     chosen = exported_model(model, settings.sensors)
     t: FloatArray = settings.step_size * np.arange(n_step + 1, dtype=np.float64)
     start = START_FRACTION * chosen.trained_amplitude.astype(np.complex128) if z0 is None else z0
-    u = random_input(chosen, t)
+    rest, u = np.zeros_like(start), random_input(chosen, t)
     free = difference(native, chosen, t, start)
-    held = difference(native, chosen, t, start, u)
-    linear = difference(native, chosen, t, start, u, hold="linear")
+    held = difference(native, chosen, t, rest, u)
+    linear = difference(native, chosen, t, rest, u, hold="linear")
     worst = max(free, held, linear)
-    if not worst <= NATIVE_LIMIT:
-        raise AcceptanceError("the native unit differs from the Python model", where=str(native), value=worst)
     python_problems: tuple[str, ...] = ()
     python_rel = None
     if pythonfmu is not None:
         python_problems = fmpy_problems(pythonfmu)
-        python_rel = max(difference(pythonfmu, chosen, t, start), difference(pythonfmu, chosen, t, start, u))
+        python_rel = max(difference(pythonfmu, chosen, t, start), difference(pythonfmu, chosen, t, rest, u))
     problems = fmpy_problems(native)
     return FmuCheck(problems, worst, free, held, linear, python_problems, python_rel, settings.step_size, n_step)
 
@@ -120,7 +122,11 @@ def random_input(model: ReducedModel, t: FloatArray) -> FloatArray:
 
 
 def _relative(actual: FloatArray, expected: FloatArray) -> float:
-    """Largest over the columns of max |actual - expected| / max |expected|."""
+    """Largest over the columns of max |actual - expected| / max |expected|.
+
+    A column that moves less than 1e-6 of the largest one counts relative to that: it is round-off of the others.
+    """
     error = np.max(np.abs(actual - expected), axis=0)
-    size = np.maximum(np.max(np.abs(expected), axis=0), np.finfo(float).tiny)
-    return float(np.max(error / size))
+    size = np.max(np.abs(expected), axis=0)
+    floor = max(STILL_FRACTION * float(np.max(size)), np.finfo(float).tiny)
+    return float(np.max(error / np.maximum(size, floor)))

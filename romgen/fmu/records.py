@@ -83,7 +83,7 @@ class FmuCheck:
     """How far exported units are from the standard and from the Python model under the same input.
 
     Each error is the largest absolute difference of a quantity over the run divided by its largest magnitude, then the
-    largest over states, displacements and velocities.
+    largest over states, displacements and velocities (a quantity that hardly moves counts relative to the others).
 
     Attributes
     ----------
