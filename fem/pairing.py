@@ -97,7 +97,7 @@ def project(points: FloatArray, targets: FloatArray, facets: IntArray, reach: fl
 
 
 def _candidates(corner: FloatArray, targets: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Target and facet numbers of all pairs that may be within ``reach``: bounding spheres of the facets (n_facet, ...).
+    """Target and facet numbers of all pairs that may be within ``reach``: bounding spheres of corner (n_facet, ..., 3).
 
     Quadratic facets bulge out of their nodes by less than their half size, hence the sphere of twice the node radius.
     """

@@ -1,0 +1,50 @@
+"""Rigid motions that neither supports nor interfaces resist: found before a solver meets a singular matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fem.arrays import FloatArray
+from fem.errors import FemInputError
+from fem.model import Model
+
+_TOLERANCE = 1e-8
+"""Singular value of the restraints, relative to the largest, below which a rigid motion counts as free."""
+
+
+def rigid_motions(model: Model) -> FloatArray:
+    """Three translations and three rotations (about the centre, unit largest displacement) per body, (n_dof, 6 n_body).
+
+    m per m: columns 6 b + (0, 1, 2) translate body b along x, y, z; 6 b + (3, 4, 5) rotate it about x, y, z.
+    """
+    motions = np.zeros((len(model.points), 3, len(model.bodies), 6))
+    for number, (body, offset) in enumerate(zip(model.bodies, model.offsets, strict=True)):
+        arm = body.mesh.points - body.mesh.points.mean(axis=0)
+        arm = arm / np.linalg.norm(arm, axis=1).max()
+        rows = slice(int(offset), int(offset) + len(arm))
+        motions[rows, :, number, :3] = np.eye(3)
+        motions[rows, :, number, 3:] = np.cross(np.eye(3)[None], arm[:, None, :]).transpose(0, 2, 1)
+    return motions.reshape(model.n_dof, -1)
+
+
+def check_restraint(model: Model) -> None:
+    """Raise ``FemInputError`` that names a body which can move freely even with all interfaces closed.
+
+    Rank of the supported rows and of B R over the rigid motions R; frictionless points resist along the normal only.
+    """
+    motions = rigid_motions(model)
+    contact = model.contact
+    resists = np.column_stack([np.ones(contact.n_point, dtype=bool), *([contact.law[:, 2] > 0.0] * 2)]).ravel()
+    restraint = np.vstack([motions[~model.free], (contact.operator @ motions)[resists]])
+    # At least as many rows as columns, so that every direction of the null space has its singular value.
+    restraint = np.vstack([restraint, np.zeros((motions.shape[1], motions.shape[1]))])
+    _, size, directions = np.linalg.svd(restraint, full_matrices=False)
+    if size[-1] > _TOLERANCE * size[0]:
+        return
+    share = directions[-1].reshape(-1, 6)
+    part = np.linalg.norm(share, axis=1)
+    names = ", ".join(body.name for body, size in zip(model.bodies, part, strict=True) if size > 0.1 * part.max())
+    kind, axis = divmod(int(np.abs(share[part.argmax()]).argmax()), 3)
+    motion = f"{('translate along', 'rotate about')[kind]} {'xyz'[axis]}"
+    advice = "add a support or a contact that holds it"
+    raise FemInputError("nothing holds a part of the structure", where=names, value=f"free to {motion}", advice=advice)
