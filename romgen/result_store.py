@@ -98,7 +98,7 @@ class ResultStore:
         self._pending.rmdir()
 
     def _merge(self, temporary: Path) -> None:
-        with h5py.File(temporary, "w") as merged:
+        with h5py.File(temporary, "w", track_order=True) as merged:
             merged.attrs["schema_version"] = SCHEMA_VERSION
             for stage in self._infos:
                 with open_for_reading(self._file_of(stage)) as source:

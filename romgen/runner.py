@@ -27,7 +27,7 @@ class RunResult:
     ----------
     run_dir : folder with everything it left behind.
     computed, reused : names of the stages, in order.
-    infos : time, memory and messages of each stage, also of the reused ones.
+    infos : time, memory and messages of every stage that is stored and up to date, reused and later ones too.
     context : gives the record of each stage: ``result.context.record("learn", Learned)``.
     """
 
@@ -68,7 +68,8 @@ def execute(
     with locked(run_dir), _log_file(run_dir / "run.log"):
         store = ResultStore(run_dir)
         try:
-            return _run(wanted, Context(study, run_dir, store), store, keys, (force, progress or SilentProgress()))
+            context = Context(study, run_dir, store, keys)
+            return _run(wanted, context, store, keys, (force, progress or SilentProgress()))
         finally:
             store.consolidate(keys)
 
@@ -92,8 +93,7 @@ def _run(
             _compute(stage, context, store)
             computed.append(stage.name)
         progress.finished(stage.name, store.infos[stage.name].wall_s, stage.name in reused)
-    infos = {stage.name: store.infos[stage.name] for stage in stages}
-    return RunResult(context.run_dir, tuple(computed), tuple(reused), infos, context)
+    return RunResult(context.run_dir, tuple(computed), tuple(reused), context.infos(), context)
 
 
 def _compute(stage: Stage, context: Context, store: ResultStore) -> None:

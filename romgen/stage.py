@@ -27,8 +27,8 @@ Record = TypeVar("Record")
 class Context:
     """What a stage may use: the study, the records of earlier stages, its run folder, its progress report."""
 
-    def __init__(self, study: Study, run_dir: Path, store: ResultStore) -> None:
-        self.study, self.run_dir, self._store = study, run_dir, store
+    def __init__(self, study: Study, run_dir: Path, store: ResultStore, keys: Mapping[str, str]) -> None:
+        self.study, self.run_dir, self._store, self._keys = study, run_dir, store, keys
         self._records: dict[str, Any] = {}
         self.stage, self.key = "", ""
         self.report: Report = _ignore
@@ -49,8 +49,9 @@ class Context:
         return SegmentStore(self.run_dir / "segments" / self.stage, self.key)
 
     def infos(self) -> dict[str, StageInfo]:
-        """Return time, memory and messages of the stored stages."""
-        return self._store.infos
+        """Return time, memory and messages of the stages that are stored and up to date, in their order."""
+        stored = self._store.infos
+        return {stage: stored[stage] for stage, key in self._keys.items() if self._store.has(stage, key)}
 
 
 def _ignore(fraction: float, text: str) -> None:

@@ -25,7 +25,7 @@ BACKBONE_POINTS = 50
 
 
 def summarise(result: RunResult) -> dict[str, Any]:
-    """Return the content of summary.json for the stages that a run brought up to date."""
+    """Return the content of summary.json for all stages that are stored and up to date."""
     context = result.context
     content: dict[str, Any] = {
         "study": context.study.name,

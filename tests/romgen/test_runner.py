@@ -98,6 +98,8 @@ def test_until_force_and_missing_file(tmp_path: Path) -> None:
     toy = Recorder()
     assert toy.run(tmp_path, until="second").computed == ("first", "second")
     assert toy.run(tmp_path).computed == ("third",)
+    assert list(toy.run(tmp_path, until="first").infos) == ["first", "second", "third"]
+    assert list(toy.run(tmp_path, study(modes={"count": 7}), until="first").infos) == ["first"]
     assert toy.run(tmp_path, force=True).computed == ("first", "second", "third")
     (tmp_path / "small.txt").unlink()
     assert toy.run(tmp_path).computed == ("second",)
