@@ -33,22 +33,20 @@ Motion = tuple[ComplexArray, ComplexArray, FloatArray]
 def forced_response(model: ReducedModel, settings: ForcedResponseSettings) -> ForcedResponse:
     """Return the frequency response curves of all levels of one load input.
 
-    Route: equilibria in the rotating frame where every term of the normal form is resonant; otherwise harmonic
-    balance on the complete reduced model. Both by pseudo-arclength continuation, then a search for further branches.
+    Equilibria in the rotating frame where every term is resonant, otherwise harmonic balance on the complete model;
+    both by continuation, then a search for further branches.
 
     Parameters
     ----------
-    model : a finished reduced model.
     settings : input, levels (amplitude of the cosine), sensor, measure, frequency range. Without a range it follows
-        from the eigenvalue and the backbone at the highest level. The mode nearest to the middle of the range is the
-        one taken as driven: below it, modes with a smaller r_j answer subharmonically.
+        from the eigenvalue and the backbone. The mode nearest to the middle of the range is taken as driven.
 
     Raises
     ------
     InputError : unknown input or sensor, or no level.
     NumericalError : a curve could not be started from either end of the range.
 
-    Source: Morsy et al. 2024; Breunung, Haller 2018; Jain, Haller 2022.
+    Source: Morsy et al. 2024; Breunung, Haller 2018.
     """
     started = time.perf_counter()
     _check(model, settings)

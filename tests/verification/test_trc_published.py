@@ -8,7 +8,12 @@ from scipy.optimize import brentq
 
 from romgen.arrays import FloatArray
 from romgen.backbone import backbone
+from romgen.branch import ContinuationSettings
+from romgen.continuation import continue_branch
 from romgen.forced_response import forced_response
+from romgen.forcing import harmonic_load
+from romgen.periodic_orbit import harmonic_balance
+from romgen.rotating_frame import rotating_frame
 from romgen.settings import ForcedResponseSettings
 from tests.normal_form_models import published_order5, published_order7
 
@@ -35,6 +40,24 @@ def test_order5_folds_up_to_one_force_scale() -> None:
     scale = brentq(lambda s: fold_periods_ms(4.0 * s)[1] - 9.5355, 0.3884 / 1.005, 0.3884 * 1.005, xtol=1e-6)
     np.testing.assert_allclose(fold_periods_ms(4.0 * scale), [9.2521, 9.5355], atol=1e-4)
     np.testing.assert_allclose(fold_periods_ms(2.0 * scale), [9.1700, 9.2140], atol=1e-4)
+
+
+def test_both_routes_find_the_same_folds() -> None:
+    """Equilibria in the rotating frame against periodic orbits of the complete model, with the load's other half.
+
+    That half moves z by abs(f) / 2 omega, 6e-4 of its size, whose square is what reaches the folds.
+    """
+    model = published_order7(0.4)
+    load = harmonic_load(model, "load", 4.0)
+    settings = ContinuationSettings((2.0 * np.pi * 100.0, 2.0 * np.pi * 116.0), state_scale=0.2, parameter_scale=7.0)
+    folds = []
+    for system in (rotating_frame(model, load, 0), harmonic_balance(model, load, 0, 3)):
+        omega = settings.parameter_range[1]
+        start = system.start(system.linear_response(omega), omega)
+        branch = continue_branch(system, start, omega, settings)
+        folds.append([fold.p for fold in branch.located("fold")])
+    assert len(folds[0]) == 2
+    np.testing.assert_allclose(folds[0], folds[1], rtol=2e-6)
 
 
 def test_order7_backbone_with_torsion_zero() -> None:
