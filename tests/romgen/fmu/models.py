@@ -94,3 +94,27 @@ def _decay(e: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> FloatArray:
 def _complex(rng: np.random.Generator, shape: tuple[int, int]) -> ComplexArray:
     c: ComplexArray = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
     return c
+
+
+def duffing_chain(m: int) -> ReducedModel:
+    """m uncoupled damped oscillators with cubic frequency shift, linear chart, one sensor each."""
+    lam: ComplexArray = 2.0 * np.pi * np.arange(1, m + 1) * 70.0 * (-0.01 + 1j)
+    unit = np.eye(2 * m, dtype=np.int64)
+    cubic = 2 * unit[:m] + unit[m:]
+    chart = np.vstack([np.hstack([np.eye(m), np.zeros((m, m))]), np.hstack([1j * np.eye(m), np.zeros((m, m))])])
+    return ReducedModel(
+        name=f"chain_{m}",
+        eigenvalues=lam,
+        normal_form=PolynomialMap(cubic, 25j * np.eye(m)),
+        chart=PolynomialMap(unit, chart.astype(np.complex128)),
+        inverse_chart=PolynomialMap(unit, np.hstack([np.eye(m), -1j * np.eye(m)])),
+        scale=np.ones(2 * m),
+        displacement=PolynomialMap(unit, np.hstack([np.eye(m), np.zeros((m, m))])),
+        velocity=PolynomialMap(unit, np.hstack([np.zeros((m, m)), np.diag(lam.imag)])),
+        sensors=tuple(f"mass_{j}" for j in range(1, m + 1)),
+        inputs=("force",),
+        input_units=("N",),
+        input_matrix=np.ones((m, 1), dtype=np.complex128),
+        internal_resonance=(),
+        trained_amplitude=np.ones(m),
+    )

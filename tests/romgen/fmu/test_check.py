@@ -12,12 +12,13 @@ from romgen.errors import InputError
 from romgen.fmu.check import check_fmu
 from romgen.fmu.driver import replay
 from romgen.fmu.export import export_fmu
+from romgen.fmu.python_export import export_pythonfmu
 from romgen.fmu.records import FmuExport
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
 from romgen.simulate import sensors, simulate
-from tests.romgen.fmu.models import random_model
+from tests.romgen.fmu.models import duffing_chain, random_model
 
 
 def test_both_units_agree_with_their_model(native: FmuExport, pythonfmu_unit: FmuExport, model: ReducedModel) -> None:
@@ -70,3 +71,29 @@ def test_a_model_that_cannot_be_exported_is_refused(change: dict[str, object], m
 def test_an_unknown_sensor_is_refused(model: ReducedModel, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nowhere"):
         export_fmu(model, tmp_path / "x.fmu", FmuSettings(sensors=("nowhere",)))
+
+
+@pytest.mark.parametrize("m", [1, 3])
+def test_any_number_of_modes(m: int, tmp_path: Path) -> None:
+    model = duffing_chain(m)
+    export = export_fmu(model, tmp_path / "native.fmu", FmuSettings())
+    python = export_pythonfmu(model, tmp_path / "python.fmu", FmuSettings())
+    check = check_fmu(export.path, model, FmuSettings(), pythonfmu=python.path, n_step=200)
+    assert check.fmpy_problems == check.pythonfmu_problems == ()
+    assert check.native_vs_python_rel <= 1e-12
+    assert check.pythonfmu_vs_python_rel is not None
+    assert check.pythonfmu_vs_python_rel <= 1e-12
+
+
+def test_a_small_free_decay_has_the_frequency_and_damping_of_its_eigenvalue(tmp_path: Path) -> None:
+    """200 cycles at an amplitude whose cubic term shifts the frequency by 25e-12 / omega."""
+    model = duffing_chain(1)
+    export = export_fmu(model, tmp_path / "x.fmu", FmuSettings())
+    lam = model.eigenvalues[0]
+    t = np.arange(0.0, 200 * 2.0 * np.pi / lam.imag, 1e-3)
+    run = replay(export.path, t, np.array([1e-6 + 0j]))
+    z = run.state[:, 0] + 1j * run.state[:, 1]
+    slope = np.log(np.abs(z[-1] / z[0])) / t[-1]
+    phase = np.unwrap(np.angle(z))[-1] / t[-1]
+    assert slope == pytest.approx(lam.real, rel=1e-8)
+    assert phase == pytest.approx(lam.imag, rel=1e-8)
