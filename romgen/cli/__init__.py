@@ -1,0 +1,1 @@
+"""The command ``romgen``, one file per subcommand."""
