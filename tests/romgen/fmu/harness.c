@@ -1,58 +1,8 @@
 /* Loads an exported library without any Python and goes through the whole FMI 2.0 interface.
    Usage: harness LIBRARY. Prints "ok" and returns 0, or names the first check that failed. */
-#include <dlfcn.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "interface.h"
 
-#include "fmi2Functions.h"
-#include "model_sizes.h"
-
-#define N_STATE (2 * N_MODE)
-#define N_REAL (2 * N_STATE + N_INPUT + 2 * N_SENSOR + N_MODE + 5 + 2 * N_MODE)
-#define FIRST_INPUT (2 * N_STATE)
-#define FIRST_SENSOR (FIRST_INPUT + N_INPUT)
-#define H 1e-4
-
-#define CHECK(condition)                                               \
-    do {                                                               \
-        if (!(condition)) {                                            \
-            fprintf(stderr, "line %d: %s\n", __LINE__, #condition);    \
-            exit(1);                                                   \
-        }                                                              \
-    } while (0)
-
-/* One pointer per function of the standard, named like the function. */
-#define ALL_FUNCTIONS(X)                                                                                         \
-    X(GetTypesPlatform) X(GetVersion) X(SetDebugLogging) X(Instantiate) X(FreeInstance) X(SetupExperiment)       \
-    X(EnterInitializationMode) X(ExitInitializationMode) X(Terminate) X(Reset) X(GetReal) X(GetInteger)          \
-    X(GetBoolean) X(GetString) X(SetReal) X(SetInteger) X(SetBoolean) X(SetString) X(GetFMUstate)                \
-    X(SetFMUstate) X(FreeFMUstate) X(SerializedFMUstateSize) X(SerializeFMUstate) X(DeSerializeFMUstate)         \
-    X(GetDirectionalDerivative) X(EnterEventMode) X(NewDiscreteStates) X(EnterContinuousTimeMode)                \
-    X(CompletedIntegratorStep) X(SetTime) X(SetContinuousStates) X(GetDerivatives) X(GetEventIndicators)         \
-    X(GetContinuousStates) X(GetNominalsOfContinuousStates) X(SetRealInputDerivatives)                           \
-    X(GetRealOutputDerivatives) X(DoStep) X(CancelStep) X(GetStatus) X(GetRealStatus) X(GetIntegerStatus)        \
-    X(GetBooleanStatus) X(GetStringStatus)
-
-#define DECLARE(name) static fmi2##name##TYPE *name;
-ALL_FUNCTIONS(DECLARE)
-
-static int n_function, n_message;
-
-#define LOAD(name)                                            \
-    *(void **)(&name) = dlsym(library, "fmi2" #name);         \
-    n_function += name != NULL;
-
-static void load(const char *path)
-{
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (library == NULL)
-        fprintf(stderr, "%s\n", dlerror());
-    CHECK(library != NULL);
-    ALL_FUNCTIONS(LOAD)
-    CHECK(n_function == 44);
-}
+static int n_message;
 
 static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                    fmi2String message, ...)
