@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 import romgen
+from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
 from romgen.fmu.interface import FmuInterface
 from romgen.fmu.records import FmuInfo
@@ -93,7 +94,11 @@ def tool_name() -> str:
 
 def generation_time() -> str:
     """SOURCE_DATE_EPOCH as FMI writes times, ending in Z."""
-    epoch = int(os.environ.get("SOURCE_DATE_EPOCH", DEFAULT_EPOCH))
+    given = os.environ.get("SOURCE_DATE_EPOCH", str(DEFAULT_EPOCH))
+    if not given.isdecimal():
+        advice = "give seconds since 1970, or unset it"
+        raise InputError("no time", where="environment variable SOURCE_DATE_EPOCH", value=given, advice=advice)
+    epoch = int(given)
     return datetime.fromtimestamp(epoch, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 

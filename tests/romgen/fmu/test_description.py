@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
+from romgen.errors import InputError
 from romgen.fmu.driver import Slave, fmpy_problems
 from romgen.fmu.export import export_fmu
 from romgen.fmu.interface import build_interface
@@ -110,6 +111,9 @@ def test_source_date_epoch_is_the_date(model: ReducedModel, tmp_path: Path, monk
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     export_fmu(model, tmp_path / "x.fmu", SOURCE_ONLY)
     assert read_model_description(tmp_path / "x.fmu").generationDateAndTime == "2023-11-14T22:13:20Z"
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(InputError, match="yesterday"):
+        export_fmu(model, tmp_path / "x.fmu", SOURCE_ONLY)
 
 
 def test_the_information_reaches_description_documentation_and_icon(model: ReducedModel, tmp_path: Path) -> None:
