@@ -89,14 +89,19 @@ def march_ringdowns(context: Context) -> RingDowns:
     segments = context.segments()
     if len(segments):
         log.info("ringdowns: continuing after %d finished segments", len(segments))
-    restart = segments.last(fe.RingDownSegment)
-    for segment in fe.march_ringdowns(study, preload, modes, restart):
+    _tell(context, settings, len(segments))
+    for segment in fe.march_ringdowns(study, preload, modes, segments.last(fe.RingDownSegment)):
         segments.append(segment)
-        done = min(len(segments) * settings.segment_steps, settings.steps)
-        context.report(done / settings.steps, f"{done * settings.time_step:.3f} of {settings.duration:.3f} s")
+        _tell(context, settings, len(segments))
     joined = fe.join_ringdowns(segments.load_all(fe.RingDownSegment), study, modes)
     count = len(settings.training)
     return RingDowns(joined[:count], joined[count:])
+
+
+def _tell(context: Context, settings: RingDownSettings, finished: int) -> None:
+    """Report how far the march is."""
+    steps = min(finished * settings.segment_steps, settings.steps)
+    context.report(steps / settings.steps, f"{steps * settings.time_step:.3f} of {settings.duration:.3f} s")
 
 
 def _ringdown_settings(study: Study) -> RingDownSettings:

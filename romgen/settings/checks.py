@@ -12,6 +12,7 @@ from romgen.settings.data import DataSettings
 from romgen.settings.finite_elements import BlockSettings, RingDownSettings
 from romgen.settings.study import Study
 
+PLATFORMS = ("host", "all", "linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin")
 # Plausible solids, foam to tungsten; outside of it the unit system is probably not SI.
 DENSITY_RANGE = (50.0, 25_000.0)
 YOUNG_MODULUS_RANGE = (1e6, 2e12)
@@ -170,6 +171,9 @@ def _downstream_problems(study: Study) -> Iterator[str]:
     inputs = ("base_acceleration",) if study.base_acceleration is not None else ()
     if forced.levels and forced.input not in inputs:
         yield _unknown("[forced_response] input:", "load input", forced.input, inputs)
+    for platform in study.fmu.platforms:
+        if platform not in PLATFORMS:
+            yield _unknown("[fmu] platforms:", "platform", platform, PLATFORMS)
     for sensor in study.fmu.sensors or ():
         if sensor not in known:
             yield _unknown("[fmu] sensors:", "sensor", sensor, known)

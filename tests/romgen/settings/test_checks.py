@@ -6,7 +6,9 @@ from typing import Any
 
 import pytest
 
+from romgen.fmu.compilers import TARGETS
 from romgen.settings import Study, study_warnings, surfaces
+from romgen.settings.checks import PLATFORMS
 
 STEEL = {
     "SI": (2.1e11, 7850.0, 0),
@@ -35,3 +37,7 @@ def test_unit_strings_give_si_numbers(tables: dict[str, Any]) -> None:
 
 def test_faces_of_all_blocks(tables: dict[str, Any]) -> None:
     assert len(surfaces(Study.model_validate(tables))) == 12
+
+
+def test_platforms_are_those_of_the_compiler() -> None:
+    assert set(PLATFORMS) == {"host", "all", *TARGETS}

@@ -104,6 +104,7 @@ MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_set("forced_response", "input", to="shaker"), "unknown load input 'shaker'"),
     (_set("forced_response", "measure", to="rms"), "Input should be 'max' or 'sqrt2_rms'; got 'rms'"),
     (_set("fmu", to={"sensors": ["top"]}), "[fmu] sensors: unknown sensor 'top'; did you mean 'tip'?"),
+    (_set("fmu", to={"platforms": ["linux"]}), "[fmu] platforms: unknown platform 'linux'; did you mean 'linux64'?"),
     (_set("fmu", to={"step_size": "1 h"}), "[fmu] step_size: unknown unit 'h'"),
     (_set("data", to={"files": ["a.mat"], "sensors": ["a"], "training": [0]}), "both [data] and a finite-element"),
     (_without("ringdowns"), "has [blocks] but no [ringdowns]"),
