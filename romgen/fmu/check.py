@@ -33,27 +33,23 @@ def check_fmu(
     n_step: int = N_STEP,
     z0: ComplexArray | None = None,
 ) -> FmuCheck:
-    """Compare exported units with the Python model under the same input treatment, through fmpy.
+    """Measure how far exported units are from the Python model under the same input treatment, through fmpy.
 
-    Runs: free from a start state; from rest under random sines with the input held in each step; the same with the
-    input linear in each step (native only, pythonfmu units have no input derivatives).
+    The algorithms are equal, so round-off (1e-12 or less) is expected.
+
+    Runs: free from a start state; from rest under random sines held in each step; the same linear in each step (native
+    only, pythonfmu units have no input derivatives).
 
     Parameters
     ----------
     native, pythonfmu : the units; the second is optional.
-    model : what they were exported from.
-    settings : the settings of the export.
+    model, settings : what they were exported from.
     n_step : communication steps of each run.
     z0 : (m,) start state of the free run, default half the trained amplitudes.
 
-    Returns
-    -------
-    The measured differences; the algorithms are equal, so round-off (1e-12 or less) is expected of both units.
-
     Raises
     ------
-    InputError : when a unit has no binary for this machine.
-    NumericalError : when a unit or the Python model fails on the way.
+    InputError, NumericalError : when a unit has no binary for this machine, or fails on the way.
     """
     chosen = exported_model(model, settings.sensors)
     t: FloatArray = settings.step_size * np.arange(n_step + 1, dtype=np.float64)
@@ -62,13 +58,12 @@ def check_fmu(
     free = difference(native, chosen, t, start)
     held = difference(native, chosen, t, rest, u)
     linear = difference(native, chosen, t, rest, u, hold="linear")
-    worst = max(free, held, linear)
     python_problems: tuple[str, ...] = ()
     python_rel = None
     if pythonfmu is not None:
         python_problems = fmpy_problems(pythonfmu)
         python_rel = max(difference(pythonfmu, chosen, t, start), difference(pythonfmu, chosen, t, rest, u))
-    problems = fmpy_problems(native)
+    worst, problems = max(free, held, linear), fmpy_problems(native)
     return FmuCheck(problems, worst, free, held, linear, python_problems, python_rel, settings.step_size, n_step)
 
 
