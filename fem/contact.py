@@ -12,6 +12,9 @@ from fem.errors import FemInputError
 from fem.friction import traction_tangents, tractions
 from fem.pairing import Projection, SurfacePoints, project, surface_points
 
+_FACING = 0.5
+"""Surfaces face each other where their normals are within 60 degrees of opposite."""
+
 
 @dataclass(frozen=True)
 class ContactLaw:
@@ -129,12 +132,12 @@ def contact_pair(
     points : (n_node, 3) all nodes of the model, m.
     slave, master : (n_facet, n_face_local) global node numbers; the integration points belong to the slave.
     reach : largest initial distance of a pair in m; default half the mean slave facet size. Slave points without a
-        partner are no contact points.
+        partner that faces them are no contact points.
     """
     source = surface_points(points, slave)
     distance = reach if reach is not None else 0.5 * float(np.sqrt(source.area.sum() / len(slave)))
     target = project(points, source.points, master, distance)
-    paired = target.found & (np.einsum("gi,gi->g", source.normals, target.normals) < 0.0)
+    paired = target.found & (np.einsum("gi,gi->g", source.normals, target.normals) < -_FACING)
     if not paired.any():
         advice = "check that the surfaces face each other, or enlarge the reach"
         raise FemInputError(

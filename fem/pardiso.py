@@ -20,6 +20,9 @@ from fem.linear_solver import SolverStatistics
 
 _SPD, _UNSYMMETRIC = 2, 11
 _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
+_LOOSE = ("matrix is singular or indefinite", "look for an unconstrained or loose body")
+_FAILURES = {-2: ("not enough memory", "use a coarser mesh"), -4: _LOOSE, -7: _LOOSE}
+"""What MKL's error codes mean and what to do; negative pivots and zero diagonals come from loose bodies."""
 
 
 class Pardiso:
@@ -79,8 +82,8 @@ class Pardiso:
         error = self._handle.call(phase, self._matrix, b, x)
         self._seconds[key] += time.perf_counter() - start
         if error:
-            advice = "the matrix is singular or indefinite: look for an unconstrained or loose body"
-            raise FemConvergenceError("direct solver failed", where=f"pardiso {key}", value=error, advice=advice)
+            what, advice = _FAILURES.get(error, ("direct solver failed", "see the error codes of MKL PARDISO"))
+            raise FemConvergenceError(what, where=f"pardiso {key}", value=error, advice=advice)
 
 
 @cache

@@ -1,0 +1,84 @@
+"""Direct solvers: agreement, single precision as preconditioner, singular matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from fem.errors import FemConvergenceError, FemInputError
+from fem.linear_solver import available_solvers, make_solver
+from fem.sparse_product import SparseProduct
+
+SOLVERS = available_solvers()
+
+
+def _matrix(n: int = 12, *, skew: float = 0.0, shift: float = 0.05) -> sp.csr_matrix:
+    line = sp.diags([-1.0 - skew, 2.0 + shift, -1.0 + skew], [-1, 0, 1], (n, n))
+    return sp.csr_matrix(sp.kronsum(sp.kronsum(line, line), line))
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_solves_one_and_many_right_sides(name: str, symmetric: bool) -> None:
+    matrix = _matrix(skew=0.0 if symmetric else 0.3)
+    x = np.random.default_rng(1).standard_normal((matrix.shape[0], 3))
+    solver = make_solver(name, symmetric=symmetric)
+    solver.analyse(matrix)
+    solver.factor(matrix)
+    # Condition number below 250: 1e-10 is the agreement asked of all solvers and leaves four digits of room.
+    np.testing.assert_allclose(solver.solve(matrix @ x), x, atol=1e-10)
+    np.testing.assert_allclose(solver.solve(matrix @ x[:, 0]), x[:, 0], atol=1e-10)
+    assert solver.statistics.name == name
+    assert solver.statistics.solves == 2
+    assert solver.statistics.factor_entries > matrix.nnz // 2
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_factor_follows_new_values(name: str) -> None:
+    solver = make_solver(name, symmetric=True)
+    solver.analyse(_matrix())
+    for shift in (0.05, 0.5):
+        matrix = _matrix(shift=shift)
+        solver.factor(matrix)
+        np.testing.assert_allclose(solver.solve(matrix @ np.ones(matrix.shape[0])), 1.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_single_precision_preconditions_to_double(name: str) -> None:
+    """Refinement contracts by about condition number * 1e-7 per step."""
+    matrix = _matrix()
+    b = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    solver = make_solver(name, symmetric=True, single=True)
+    solver.analyse(matrix)
+    solver.factor(matrix)
+    x = solver.solve(b)
+    first = np.linalg.norm(b - matrix @ x) / np.linalg.norm(b)
+    assert first < 1e-4
+    for _ in range(3):
+        x = x + solver.solve(b - matrix @ x)
+    assert np.linalg.norm(b - matrix @ x) < 1e-13 * np.linalg.norm(b)
+    if name == "pardiso":
+        assert first > 1e-12, "the factor was not in single precision"
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_singular_matrix_is_refused(name: str) -> None:
+    matrix = sp.csr_matrix(np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 2.0]]))
+    solver = make_solver(name, symmetric=True)
+    solver.analyse(matrix)
+    with pytest.raises(FemConvergenceError, match="loose body"):
+        solver.factor(matrix)
+
+
+def test_unknown_solver_lists_the_available_ones() -> None:
+    with pytest.raises(FemInputError, match="superlu"):
+        make_solver("mumps", symmetric=True)
+    assert make_solver(symmetric=True).name == SOLVERS[0]
+
+
+def test_threaded_product_equals_scipy() -> None:
+    matrix = _matrix(skew=0.3)
+    x = np.random.default_rng(3).standard_normal((matrix.shape[0], 4))
+    # Five to seven terms per row: a few units in the last place.
+    np.testing.assert_allclose(SparseProduct(matrix)(x), matrix @ x, atol=1e-14)
