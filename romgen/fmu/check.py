@@ -36,7 +36,6 @@ def check_fmu(
     """Measure how far exported units are from the Python model under the same input treatment, through fmpy.
 
     The algorithms are equal, so round-off (1e-12 or less) is expected.
-
     Runs: free from a start state; from rest under random sines held in each step; the same linear in each step (native
     only, pythonfmu units have no input derivatives).
 
