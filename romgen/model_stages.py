@@ -88,7 +88,7 @@ def march_ringdowns(context: Context) -> RingDowns:
     preload, modes = context.record("preload", Preload), context.record("modes", Modes)
     segments = context.segments()
     if len(segments):
-        log.info("ringdowns: continuing after %d finished segments", len(segments))
+        log.warning("continued after %d finished segments; wall time and memory are those of the rest", len(segments))
     _tell(context, settings, len(segments))
     for segment in fe.march_ringdowns(study, preload, modes, segments.last(fe.RingDownSegment)):
         segments.append(segment)
