@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,6 +72,8 @@ def execute(
             return _run(wanted, context, store, keys, (force, progress or SilentProgress()))
         finally:
             store.consolidate(keys)
+            with suppress(OSError):  # not there, or a stage that failed keeps its segments in it
+                (run_dir / "segments").rmdir()
 
 
 def _run(
