@@ -142,6 +142,9 @@ def build_model(
     Unknown names, inverted cells and interfaces without partners raise ``FemInputError``.
     """
     bodies = tuple(bodies)
+    names = [body.name for body in bodies]
+    if not names or len(set(names)) < len(names):
+        raise FemInputError("a model needs bodies with names of their own", where="model", value=", ".join(names))
     counts = [len(body.mesh.points) for body in bodies]
     offsets = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
     points = np.vstack([body.mesh.points for body in bodies])

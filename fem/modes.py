@@ -13,6 +13,7 @@ from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.preload import StaticState
+from fem.rigid_motion import check_restraint
 
 
 @dataclass(frozen=True)
@@ -44,9 +45,10 @@ class Rayleigh:
 def solve_modes(model: Model, state: StaticState, count: int, *, solver: str = "auto") -> ModalBasis:
     """The lowest ``count`` modes by shift-invert Lanczos at 0.
 
-    Closed points are stuck (k_n, k_t), open points carry nothing. Without contact and supports the shift needs
-    stiffness: a singular tangent raises ``FemConvergenceError``.
+    Closed points are stuck (k_n, k_t), open points carry nothing. The shift at 0 needs stiffness: a body that nothing
+    holds raises ``FemInputError``, an unstable equilibrium ``FemConvergenceError``.
     """
+    check_restraint(model)
     elastic = model.elastic_tangent(state.u)
     tangent = model.constrain(elastic + model.contact.stick_tangent(state.contact.status[:, 0]))
     direct = make_solver(solver, symmetric=True)

@@ -158,6 +158,10 @@ class Transient:
             state = record.state
             yield record
 
+    def precondition(self, residual: FloatArray) -> FloatArray:
+        """Acceleration correction A^-1 r of the frozen factor, (n_dof, n_case) from forces (n_dof, n_case)."""
+        return self._solver.solve(residual)
+
     def _advance(self, old: MotionState, anderson: Anderson) -> StepRecord:
         h, s = self.settings.time_step, self.scheme
         n_case = old.u.shape[1]
@@ -219,7 +223,7 @@ class Transient:
                 return a, force, strain, contact, iterations
             if not np.isfinite(history[-1]):
                 break
-            correction = -rotate(w, 1.0, self._solver.solve(rotate(w, -1.0, residual))) * self._mask
+            correction = -rotate(w, 1.0, self.precondition(rotate(w, -1.0, residual))) * self._mask
             if step is not None and previous is not None:
                 anderson.remember(active, step, correction - previous)
             step = anderson.step(active, correction)
