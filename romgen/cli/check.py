@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import asdict
 
 from romgen.cli.failures import reported
@@ -15,7 +16,7 @@ def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False
     """Check a study: keys, values, names, files, units; then estimate its memory and run time."""
     study = open_study(study_path)
     out = Output(quiet=quiet, as_json=json_output)
-    warnings, size = study_warnings(study), estimate(study)
+    warnings, size = study_warnings(study) + _missing(study), estimate(study)
     for warning in warnings:
         out.text(f"warning: {warning}")
     out.text(describe(study))
@@ -26,6 +27,13 @@ def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False
     out.text("no problem found")
     sizes = None if size is None else asdict(size)
     out.document({"study": study.name, "problems": [], "warnings": warnings, "estimate": sizes})
+
+
+def _missing(study: Study) -> tuple[str, ...]:
+    """Say what this machine lacks to run the study."""
+    if study.blocks and importlib.util.find_spec("skfem") is None:
+        return ("this machine cannot run the study: scikit-fem is not installed; pip install 'romgen[fem]'",)
+    return ()
 
 
 def describe(study: Study) -> str:
