@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,7 +43,7 @@ class SensorChart:
     projection : (m, n_sensor * delays) P; mode j moves its largest sensor by eta_j.
     delays : samples in a window, 1 = the sensors themselves.
     step : s, of the uniform grid of windows and differences.
-    eigenvalues_hz : (m,) frequencies of the linear fit that defines P.
+    frequency_hz : (m,) frequencies of the linear fit that defines P.
     """
 
     projection: FloatArray = field(metadata={"unit": "1", "axes": "mode,feature"})
@@ -51,16 +52,17 @@ class SensorChart:
     frequency_hz: FloatArray = field(metadata={"unit": "Hz", "axes": "mode"})
 
 
-def modal_chart(trajectory: Trajectory, n_mode: int) -> ReducedTrajectory:
+def modal_chart(trajectory: Trajectory, modes: Sequence[int]) -> ReducedTrajectory:
     """Return y = (eta, eta') and y' = (eta', eta'') as the integrator computed them: no numerical differentiation.
 
     Parameters
     ----------
     trajectory : with eta, eta_dot, eta_ddot (n_time, n_mode) and sensor velocities.
+    modes : columns of eta that are master modes.
 
     Raises
     ------
-    InputError : modal fields or velocities are missing, or their number of modes is not n_mode.
+    InputError : modal fields or velocities are missing, or there are fewer modes.
     """
     eta, eta_dot, eta_ddot = trajectory.eta, trajectory.eta_dot, trajectory.eta_ddot
     if eta is None or eta_dot is None or eta_ddot is None or trajectory.velocity is None:
@@ -69,13 +71,14 @@ def modal_chart(trajectory: Trajectory, n_mode: int) -> ReducedTrajectory:
             where=f"trajectory '{trajectory.name}'",
             advice="write them with the finite-element ring-downs, or learn from sensors only",
         )
-    if eta.shape[1] != n_mode:
-        raise InputError("wrong number of modes", where=f"trajectory '{trajectory.name}'", value=eta.shape[1])
+    columns = list(modes)
+    if max(columns) >= eta.shape[1]:
+        raise InputError("too few modes", where=f"trajectory '{trajectory.name}'", value=eta.shape[1])
     return ReducedTrajectory(
         name=trajectory.name,
         t=trajectory.t,
-        y=np.hstack([eta, eta_dot]),
-        y_dot=np.hstack([eta_dot, eta_ddot]),
+        y=np.hstack([eta[:, columns], eta_dot[:, columns]]),
+        y_dot=np.hstack([eta_dot[:, columns], eta_ddot[:, columns]]),
         displacement=trajectory.displacement,
         velocity=trajectory.velocity,
     )

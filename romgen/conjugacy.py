@@ -23,7 +23,7 @@ from romgen.errors import NumericalError
 from romgen.polynomial import monomial_gradient, monomial_rate, monomials, zeta
 
 CHUNK = 2048
-MAX_STEPS = 40
+MAX_STEPS = 15
 # Relative decrease of the cost below which Levenberg-Marquardt has converged.
 DECREASE = 1e-6
 MAX_REJECTIONS = 25

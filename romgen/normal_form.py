@@ -19,7 +19,7 @@ from romgen.resonance import ResonanceTable, automatic_resonance, integer_resona
 from romgen.substitution import substitute_linear
 
 # Rows used by the conjugacy fit: a few thousand phases and amplitudes determine all coefficients.
-FIT_SAMPLES = 6000
+FIT_SAMPLES = 4000
 
 Resonance = tuple[int, ...] | Literal["auto"]
 

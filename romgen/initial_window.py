@@ -1,0 +1,53 @@
+"""The initial state of a motion from its first period only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from romgen.arrays import ComplexArray
+from romgen.chart import ReducedTrajectory
+from romgen.errors import NumericalError
+from romgen.etdrk4 import largest_step
+from romgen.polynomial import evaluate, jacobian, zeta
+from romgen.reduced_model import ReducedModel
+from romgen.simulate import initial_state
+from romgen.variational import sensitivities
+
+# The window is this many periods of the slowest mode.
+WINDOW_PERIODS = 1.0
+STEPS = 10
+
+
+def fitted_start(model: ReducedModel, r: ReducedTrajectory) -> ComplexArray:
+    """Return z at r.t[0] that fits y / s over the first period of the slowest mode by Gauss-Newton.
+
+    Minimises sum_k abs(y_k / s - Re(T zeta(t_k)^E))^2; the start is the inverse chart of the first sample, which is
+    also the answer where the fit does not lower the misfit.
+
+    Raises
+    ------
+    NumericalError : the model diverges within the window.
+    """
+    window = r.t <= r.t[0] + WINDOW_PERIODS * 2.0 * np.pi / float(model.eigenvalues.imag.min())
+    w = r.y[window] / model.scale
+    z0 = initial_state(model, r.y[0])
+    best, smallest = z0, np.inf
+    m = len(z0)
+    nf = (model.normal_form.exponents, model.normal_form.coefficients)
+    none = np.zeros(0, dtype=np.int64)
+    for _ in range(STEPS):
+        z, S = sensitivities(r.t[window], z0, model.eigenvalues, nf, (none, none), largest_step(model.eigenvalues))
+        if not np.isfinite(z).all():
+            break
+        misfit = w - evaluate(model.chart, zeta(z)).real
+        size = float(np.sum(misfit**2))
+        if size >= smallest * (1.0 - 1e-9):
+            break
+        best, smallest = z0, size
+        slope = jacobian(model.chart, zeta(z))
+        D = (slope[:, :, :m] @ S + slope[:, :, m:] @ S.conj()).real
+        change = np.linalg.lstsq(D.reshape(-1, 2 * m), misfit.ravel(), rcond=None)[0]
+        z0 = z0 + change[:m] + 1j * change[m:]
+    if not np.isfinite(smallest):
+        raise NumericalError("the model diverges in its first period", where=f"{model.name}, trajectory '{r.name}'")
+    return best

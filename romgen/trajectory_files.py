@@ -1,0 +1,210 @@
+"""Trajectories in files: MAT cells {t, x}, HDF5, NPZ and CSV, checked at the door."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import scipy.io
+
+from romgen.arrays import FloatArray
+from romgen.errors import InputError
+from romgen.settings.quantities import UNITS
+from romgen.trajectory import Trajectory
+
+Pair = tuple[str, FloatArray, FloatArray]
+
+
+def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) -> tuple[Trajectory, ...]:
+    """Read all trajectories of all files, displacement converted to m, names unique.
+
+    Parameters
+    ----------
+    files : .mat (cell array with columns t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and .npz (as
+        written by ``write_trajectories``, or NPZ arrays t and x), .csv (header "t [s], name [mm], ...").
+    sensors : names of the rows of x; CSV columns are found by these names.
+    unit : unit of displacement where the file has none, e.g. "m" or "mm".
+
+    Raises
+    ------
+    InputError : names file, trajectory, row and value: not readable, wrong number of sensors, NaN, time that does not
+        increase, a constant sensor.
+    """
+    trajectories: list[Trajectory] = []
+    for path in map(Path, files):
+        read = _READERS.get(path.suffix.lower())
+        if read is None:
+            raise InputError(
+                "unknown trajectory format", where=str(path), value=path.suffix, advice="use mat, h5, npz, csv"
+            )
+        if not path.is_file():
+            raise InputError("no such file", where=str(path))
+        for name, t, x in read(path, sensors, unit):
+            where = f"{path.name}, trajectory '{name}'"
+            _check(t, x, sensors, where)
+            trajectories.append(Trajectory(_unique(name, trajectories), t, tuple(sensors), x))
+    return tuple(trajectories)
+
+
+def write_trajectories(path: Path, trajectories: Iterable[Trajectory]) -> None:
+    """Write t (s) and displacement (m) of trajectories to .h5, .hdf5 or .npz, readable by ``read_trajectories``."""
+    path = Path(path)
+    if path.suffix.lower() == ".npz":
+        arrays: dict[str, Any] = {}
+        for item in trajectories:
+            arrays[f"{item.name}/t"], arrays[f"{item.name}/x"] = item.t, item.displacement
+        np.savez(path, **arrays)
+        return
+    if path.suffix.lower() not in (".h5", ".hdf5"):
+        raise InputError("unknown trajectory format", where=str(path), value=path.suffix, advice="use h5 or npz")
+    with h5py.File(path, "w") as file:
+        for item in trajectories:
+            group = file.create_group(item.name)
+            group.create_dataset("t", data=item.t).attrs["unit"] = "s"
+            group.create_dataset("x", data=item.displacement).attrs["unit"] = "m"
+            group.attrs["sensors"] = list(item.sensors)
+
+
+def _factor(unit: str, where: str) -> float:
+    if unit not in UNITS["m"]:
+        raise InputError("unknown unit", where=where, value=unit, advice=f"use one of {', '.join(UNITS['m'])}")
+    return UNITS["m"][unit]
+
+
+def _time_first(x: FloatArray, n_time: int) -> FloatArray:
+    x = np.atleast_2d(np.asarray(x, dtype=np.float64))
+    return np.ascontiguousarray(x if x.shape[0] == n_time else x.T)
+
+
+def _read_mat(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
+    cells = _mat_v73(path) if h5py.is_hdf5(path) else _mat_v5(path)
+    pairs = []
+    for number, (t, x) in enumerate(cells):
+        time = np.asarray(t, dtype=np.float64).ravel()
+        pairs.append((f"{path.stem}_{number}", time, _factor(unit, path.name) * _time_first(x, time.size)))
+    return pairs
+
+
+def _mat_v5(path: Path) -> list[tuple[FloatArray, FloatArray]]:
+    try:
+        contents = scipy.io.loadmat(path)
+    except (ValueError, NotImplementedError, OSError) as error:
+        raise InputError(f"not a MAT file: {error}", where=str(path)) from error
+    for value in contents.values():
+        if isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 2 and value.shape[1] >= 2:
+            return [(row[0], row[1]) for row in value]
+    raise InputError("no cell array with columns t and x", where=str(path), value=sorted(contents))
+
+
+def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
+    with h5py.File(path) as file:
+        for name, item in file.items():
+            if isinstance(item, h5py.Dataset) and item.dtype == h5py.ref_dtype and item.ndim == 2 and name[0] != "#":
+                # MATLAB stores arrays transposed: cell (n, 2) appears as (2, n), x (n_sensor, n_time) as its transpose.
+                return [(file[item[0, k]][()], file[item[1, k]][()].T) for k in range(item.shape[1])]
+    raise InputError("no cell array with columns t and x", where=str(path))
+
+
+def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
+    with h5py.File(path) as file:
+        pairs = []
+        for name, group in file.items():
+            if not isinstance(group, h5py.Group) or "t" not in group or "x" not in group:
+                raise InputError("group without t and x", where=f"{path.name}/{name}")
+            stored = group["x"].attrs.get("unit", unit)
+            x = _factor(str(stored), path.name) * np.asarray(group["x"], dtype=np.float64)
+            pairs.append((str(name), np.asarray(group["t"], dtype=np.float64), x))
+    return pairs
+
+
+def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
+    with np.load(path) as arrays:
+        names = sorted({key.rpartition("/")[0] for key in arrays.files if key.endswith("t")})
+        pairs = []
+        for name in names:
+            prefix = f"{name}/" if name else ""
+            if f"{prefix}x" not in arrays:
+                raise InputError("array t without array x", where=path.name, value=f"{prefix}t")
+            t = np.asarray(arrays[f"{prefix}t"], dtype=np.float64).ravel()
+            # Files of this package are in m; a bare pair t, x has the unit of the study.
+            factor = 1.0 if name else _factor(unit, path.name)
+            pairs.append((name or path.stem, t, factor * _time_first(arrays[f"{prefix}x"], t.size)))
+    return pairs
+
+
+def _read_csv(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if len(rows) < 2:
+        raise InputError("no data rows", where=str(path))
+    heads = [_head(cell) for cell in rows[0]]
+    names = [name for name, _ in heads]
+    columns = []
+    for wanted, kind, default in [("t", "s", "s"), *((sensor, "m", unit) for sensor in sensors)]:
+        if wanted not in names:
+            raise InputError(
+                f"no column '{wanted}'", where=path.name, value=names, advice="header: t [s], name [mm], ..."
+            )
+        symbol = heads[names.index(wanted)][1] or default
+        if symbol not in UNITS[kind]:
+            raise InputError("unknown unit", where=f"{path.name}, column '{wanted}'", value=symbol)
+        columns.append((names.index(wanted), UNITS[kind][symbol]))
+    table = np.array([[_number(row, k, line, path) * f for k, f in columns] for line, row in enumerate(rows[1:], 2)])
+    return [(path.stem, table[:, 0].copy(), np.ascontiguousarray(table[:, 1:]))]
+
+
+def _head(cell: str) -> tuple[str, str]:
+    name, _, rest = cell.partition("[")
+    return name.strip(), rest.rstrip("] \t").strip()
+
+
+def _number(row: list[str], column: int, line: int, path: Path) -> float:
+    try:
+        return float(row[column])
+    except (IndexError, ValueError) as error:
+        raise InputError("not a number", where=f"{path.name}, line {line}, column {column + 1}", value=row) from error
+
+
+def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> None:
+    if x.ndim != 2 or x.shape != (t.size, len(sensors)):
+        raise InputError(
+            "wrong number of sensors or samples",
+            where=where,
+            value=x.shape,
+            advice=f"expected {(t.size, len(sensors))}",
+        )
+    bad = ~np.isfinite(np.column_stack([t, x]))
+    if bad.any():
+        row, column = map(int, np.argwhere(bad)[0])
+        name = ("t", *sensors)[column]
+        raise InputError("not a finite number", where=f"{where}, row {row}, column '{name}'", value="nan or inf")
+    backward = np.flatnonzero(np.diff(t) <= 0)
+    if backward.size:
+        row = int(backward[0]) + 1
+        raise InputError("time does not increase", where=f"{where}, row {row}", value=f"{t[row - 1]!r} then {t[row]!r}")
+    constant = np.flatnonzero(np.ptp(x, axis=0) == 0)
+    if constant.size:
+        raise InputError(
+            "the sensor is constant", where=f"{where}, sensor '{sensors[constant[0]]}'", value=x[0, constant[0]]
+        )
+
+
+def _unique(name: str, known: Sequence[Trajectory]) -> str:
+    taken = {item.name for item in known}
+    candidate, number = name, 2
+    while candidate in taken:
+        candidate, number = f"{name}_{number}", number + 1
+    return candidate
+
+
+_READERS: dict[str, Callable[[Path, Sequence[str], str], list[Pair]]] = {
+    ".mat": _read_mat,
+    ".h5": _read_hdf5,
+    ".hdf5": _read_hdf5,
+    ".npz": _read_npz,
+    ".csv": _read_csv,
+}
