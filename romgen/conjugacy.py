@@ -92,8 +92,8 @@ def homological_start(
     g, resonant : (m, n_term).
     """
     detuning = eigenvalues[:, None] - exponents @ zeta(eigenvalues)
-    B = np.where(resonant, g, 0.0)
-    A = np.where(resonant, 0.0, g) / np.where(resonant, 1.0, detuning)
+    B: ComplexArray = np.where(resonant, g, 0.0)
+    A: ComplexArray = np.where(resonant, 0.0, g) / np.where(resonant, 1.0, detuning)
     return A, B
 
 
@@ -125,7 +125,8 @@ def fit_conjugacy(
     if not np.isfinite(cost):
         raise NumericalError("the conjugacy cost is not finite", where="normal form", value=cost)
     weight = ridge * np.maximum(np.diag(curvature), np.finfo(float).tiny)
-    total, costs, damping = cost + weight @ theta**2, [cost + weight @ theta**2], 1e-6
+    total, damping = cost + float(weight @ theta**2), 1e-6
+    costs = [total]
     for _ in range(MAX_STEPS):
         found = _accepted_step(problem, theta, (curvature, gradient, total), weight, damping)
         if found is None:

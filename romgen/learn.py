@@ -6,17 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
-from romgen.arrays import ComplexArray, FloatArray
+from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory, SensorChart, modal_chart, sensor_chart
 from romgen.differences import is_uniform
 from romgen.errors import InputError
 from romgen.initial_window import fitted_start
-from romgen.manifold import Manifold, ManifoldFit, lift, nmte_blocks
+from romgen.manifold import Manifold, ManifoldFit, nmte_blocks
 from romgen.metrics import nmte_percent
 from romgen.normal_form import NormalFormFit, fit_normal_form
 from romgen.order_selection import OrderTable, choose_order
-from romgen.polynomial import PolynomialMap, evaluate, exponents, zeta
+from romgen.polynomial import PolynomialMap, evaluate, exponents
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
@@ -208,7 +209,7 @@ def trajectory_error(
     return TrajectoryError(r.name, error, sensor_error, static, z0, r.t, r.displacement, predicted)
 
 
-def _snapshot_rows(trajectory: Trajectory, r: ReducedTrajectory) -> tuple[FloatArray, FloatArray]:
+def _snapshot_rows(trajectory: Trajectory, r: ReducedTrajectory) -> tuple[IntArray, npt.NDArray[np.float32]]:
     """Return the rows of r of the snapshots that start_time left, and these snapshots."""
     assert trajectory.snapshots is not None
     assert trajectory.snapshot_index is not None

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from romgen.arrays import ComplexArray, FloatArray
+from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory
 from romgen.conjugacy import ConjugacyFit, fit_conjugacy, homological_start
 from romgen.errors import NumericalError
@@ -101,7 +101,7 @@ def grow_conjugacy(
 
     The homological start is good at low order only: its small denominators grow with the degree.
     """
-    q, q_dot = samples
+    q = samples[0]
     degree = table.exponents.sum(axis=1)
     fit: ConjugacyFit | None = None
     for order in sorted({*range(3, int(degree.max()), 2), int(degree.max())}):
@@ -110,29 +110,30 @@ def grow_conjugacy(
         if fit is None:
             start = homological_start(modal_terms(dynamics, q, E, ridge), dynamics.eigenvalues, E, resonant)
         else:
-            start = tuple(np.pad(c, ((0, 0), (0, n_term - c.shape[1]))) for c in (fit.A, fit.B))
-        fit = fit_conjugacy(samples, dynamics.eigenvalues, E, resonant, (start[0], start[1]), ridge)
+            more = ((0, 0), (0, n_term - fit.A.shape[1]))
+            start = np.pad(fit.A, more), np.pad(fit.B, more)
+        fit = fit_conjugacy(samples, dynamics.eigenvalues, E, resonant, start, ridge)
     if fit is None:
         raise NumericalError("the order leaves no nonlinear term", where="normal form", value=int(degree.max()))
     return fit
 
 
-def modal_terms(dynamics: ReducedDynamics, q: ComplexArray, exponents: FloatArray, ridge: float) -> ComplexArray:
+def modal_terms(dynamics: ReducedDynamics, q: ComplexArray, exponents: IntArray, ridge: float) -> ComplexArray:
     """Return g (m, n_term) of q' = Lambda q + g phi(q): the fitted vector field in modal coordinates."""
     w = 2.0 * (q @ dynamics.vectors.T).real
-    rate = evaluate(dynamics.field, w) @ dynamics.inverse.T
+    rate = evaluate(dynamics.vector_field, w) @ dynamics.inverse.T
     return ridge_fit(monomials(zeta(q), exponents), rate - dynamics.eigenvalues * q, ridge)
 
 
 def fit_chart(
-    dynamics: ReducedDynamics, q: ComplexArray, z: ComplexArray, exponents: FloatArray, ridge: float
+    dynamics: ReducedDynamics, q: ComplexArray, z: ComplexArray, exponents: IntArray, ridge: float
 ) -> PolynomialMap[np.complex128]:
     """Return T of w = 2 Re(V (z + C phi(z))), C by regression of q - z along the samples."""
     C = ridge_fit(monomials(zeta(z), exponents), q - z, ridge)
     return chart_from(dynamics, exponents, C)
 
 
-def chart_from(dynamics: ReducedDynamics, exponents: FloatArray, C: ComplexArray) -> PolynomialMap[np.complex128]:
+def chart_from(dynamics: ReducedDynamics, exponents: IntArray, C: ComplexArray) -> PolynomialMap[np.complex128]:
     """Return T = 2 V [I, 0, C] over (z, conj z, phi)."""
     m = len(C)
     linear = np.eye(2 * m, dtype=np.int64)
@@ -140,7 +141,7 @@ def chart_from(dynamics: ReducedDynamics, exponents: FloatArray, C: ComplexArray
     return PolynomialMap(np.vstack([linear, exponents]), 2.0 * dynamics.vectors @ rows)
 
 
-def inverse_chart(dynamics: ReducedDynamics, exponents: FloatArray, A: ComplexArray) -> PolynomialMap[np.complex128]:
+def inverse_chart(dynamics: ReducedDynamics, exponents: IntArray, A: ComplexArray) -> PolynomialMap[np.complex128]:
     """Return H of z = q + A phi(q), q = (V^-1 w)_{1..m}, expanded in monomials of w."""
     m = len(A)
     near_identity = PolynomialMap(

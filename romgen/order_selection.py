@@ -13,7 +13,7 @@ from romgen.errors import NumericalError
 from romgen.initial_window import fitted_start
 from romgen.metrics import nmte_percent
 from romgen.normal_form import NormalFormFit, fit_normal_form
-from romgen.polynomial import PolynomialMap, evaluate, zeta
+from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate

@@ -24,14 +24,14 @@ class ReducedDynamics:
     Attributes
     ----------
     scale : (2m,) s, largest abs(y) of the training data.
-    field : R, (2m, n_term) over w, 1/s; the rows of eta' = eta' are exact.
+    vector_field : R, (2m, n_term) over w, 1/s; the rows of eta' = eta' are exact.
     eigenvalues : (m,) 1/s, positive imaginary parts, ascending.
     vectors : (2m, m) first half of V; w = 2 Re(V q), scaled so that max abs(q_j) = 0.5.
     inverse : (m, 2m) first rows of V^-1.
     """
 
     scale: FloatArray = field(metadata={"unit": "mixed", "axes": "coordinate"})
-    field: PolynomialMap[np.float64]
+    vector_field: PolynomialMap[np.float64]
     eigenvalues: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
     vectors: ComplexArray = field(metadata={"unit": "1", "axes": "coordinate,mode"})
     inverse: ComplexArray = field(metadata={"unit": "1", "axes": "mode,coordinate"})

@@ -97,7 +97,7 @@ def refine(
         accepted = False
         for _ in range(MAX_REJECTIONS):
             H = here.hessian + damping * np.diag(np.maximum(np.diag(here.hessian), 1e-30))
-            change = -np.linalg.solve(H, here.gradient)
+            change: FloatArray = -np.linalg.solve(H, here.gradient).astype(np.float64)
             trial_model, trial_segments = _moved(here.model, segments, change)
             trial = _linearise(trial_model, trial_segments, (ridge, max_step), here.weight)
             if trial.model.cost < here.model.cost:
