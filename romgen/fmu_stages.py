@@ -12,12 +12,11 @@ from romgen.fmu.driver import replay
 from romgen.fmu.export import export_fmu
 from romgen.fmu.python_export import export_pythonfmu
 from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo
-from romgen.learning_stages import learned_model, learned_record, start_state
+from romgen.learn import TrajectoryError
+from romgen.learning_stages import learned, learned_model
 from romgen.metrics import nmte_percent
-from romgen.model_stages import recorded
 from romgen.settings import Study
 from romgen.stage import Context, Stage
-from romgen.trajectory import Trajectory
 
 log = logging.getLogger(__name__)
 
@@ -56,10 +55,9 @@ class Validation:
 
 def fmu_stages(study: Study) -> tuple[Stage, ...]:
     """Return the stages for export and check."""
-    trajectories = "ringdowns" if study.data is None else "data"
     return (
         Stage("fmu", Exported, ("learn",), ("study", "fmu"), export, _unit_names),
-        Stage("validation", Validation, ("fmu", trajectories), (), validate),
+        Stage("validation", Validation, ("learn", "fmu"), (), validate),
     )
 
 
@@ -71,7 +69,7 @@ def export(context: Context) -> Exported:
     """Write the native unit and, if asked for, the pythonfmu one."""
     study, model = context.study, learned_model(context)
     paths = [context.run_dir / name for name in _unit_names(study)]
-    errors = learned_record(context).nmte_percent
+    errors = tuple((e.name, e.nmte_percent) for e in learned(context).validation)
     info = FmuInfo(origin=(f"study {study.name}", f"inputs sha256 {context.key}"), errors_percent=errors)
     native = export_fmu(model, paths[0], study.fmu, info=info, report=context.report)
     for note in native.notes:
@@ -88,15 +86,12 @@ def validate(context: Context) -> Validation:
         paths[0], learned_model(context), context.study.fmu, pythonfmu=paths[1] if len(paths) > 1 else None
     )
     context.report(0.5, "replay")
-    return Validation(check, tuple(_replay(context, item, paths[0]) for item in recorded(context).validation))
+    return Validation(check, tuple(_replay(context, item, paths[0]) for item in learned(context).validation))
 
 
-def _replay(context: Context, trajectory: Trajectory, unit: Path) -> Replay:
-    """Rebuild a motion from its start state, at the times of the recording."""
-    t, z0 = start_state(context, trajectory)
-    run = replay(unit, t, z0)
-    shown = context.study.fmu.sensors or trajectory.sensors
-    columns = [trajectory.sensors.index(sensor) for sensor in shown]
-    rows = len(trajectory.t) - len(t)
-    expected = trajectory.displacement[rows:][:, columns]
-    return Replay(trajectory.name, run.displacement, nmte_percent(expected, run.displacement))
+def _replay(context: Context, motion: TrajectoryError, unit: Path) -> Replay:
+    """Rebuild a held-out motion from the start state that its first window gave."""
+    run = replay(unit, motion.t, motion.start)
+    sensors = learned_model(context).sensors
+    columns = [sensors.index(sensor) for sensor in context.study.fmu.sensors or sensors]
+    return Replay(motion.name, run.displacement, nmte_percent(motion.displacement[:, columns], run.displacement))

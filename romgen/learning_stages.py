@@ -1,0 +1,84 @@
+"""The learning stage: from the trajectories of a study to its reduced model."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable
+from typing import Any
+
+from romgen.learn import Learned, Loads, TrajectoryError, learn
+from romgen.model_stages import recorded
+from romgen.reduced_model import ReducedModel
+from romgen.report.inputs import Reconstruction, Role
+from romgen.settings import Study
+from romgen.stage import Context, Stage
+from romgen.structure import Modes
+from romgen.trajectory import Trajectory
+
+log = logging.getLogger(__name__)
+
+
+def learning_stages(study: Study) -> tuple[Stage, ...]:
+    """Return the stage; with a finite-element model its modes give the loads."""
+    upstream = ("data",) if study.data is not None else ("modes", "ringdowns")
+    return (Stage("learn", Learned, upstream, ("study.name", "learn"), learn_model),)
+
+
+def learn_model(context: Context) -> Learned:
+    """Learn from the training trajectories; judge by the validation ones."""
+    study, trajectories = context.study, recorded(context)
+    learned = learn(trajectories.training, trajectories.validation, study.learn, study.name, _loads(context))
+    for note in learned.notes:
+        log.warning("%s", note)
+    return learned
+
+
+def _loads(context: Context) -> Loads | None:
+    """Return the loads on the master modes; recorded data have none."""
+    if context.study.data is not None:
+        return None
+    modes = context.record("modes", Modes)
+    rows = [mode - 1 for mode in context.study.learn.master_modes]
+    return Loads(modes.inputs, modes.input_units, modes.modal_load[rows]) if modes.inputs else None
+
+
+def learned(context: Context) -> Learned:
+    """Return the record of the stage."""
+    return context.record("learn", Learned)
+
+
+def learned_model(context: Context) -> ReducedModel:
+    """Return the reduced model."""
+    return learned(context).model
+
+
+def reconstructions(context: Context) -> tuple[Reconstruction, ...]:
+    """Return every trajectory beside what the model makes of its start."""
+    record = learned(context)
+    sensors = record.model.sensors
+
+    def pairs(errors: Iterable[TrajectoryError], role: Role) -> list[Reconstruction]:
+        return [
+            Reconstruction(Trajectory(e.name, e.t, sensors, e.displacement), e.predicted, e.nmte_percent, role)
+            for e in errors
+        ]
+
+    return (*pairs(record.training, "training"), *pairs(record.validation, "validation"))
+
+
+def learning_summary(context: Context) -> dict[str, Any]:
+    """Return the part "learn" of summary.json."""
+    record = learned(context)
+    roles = {"training": record.training, "validation": record.validation}
+    return {
+        "order": record.order,
+        "dimension": 2 * len(record.model.eigenvalues),
+        "eigenvalues_per_s": record.model.eigenvalues,
+        "internal_resonance": record.model.internal_resonance,
+        "trained_amplitude": record.model.trained_amplitude,
+        "nmte_percent": {role: {e.name: e.nmte_percent for e in errors} for role, errors in roles.items()},
+        "sensor_nmte_percent": {
+            role: {e.name: e.sensor_nmte_percent for e in errors} for role, errors in roles.items()
+        },
+        "static_percent": {role: {e.name: e.static_percent for e in errors} for role, errors in roles.items()},
+    }

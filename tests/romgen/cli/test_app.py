@@ -1,0 +1,130 @@
+"""The command line: exit codes, one line per mistake, JSON for machines, nothing when quiet."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import romgen
+from romgen.cli import run as run_command
+from romgen.cli.app import app
+from romgen.errors import NumericalError
+from tests.lab_study import write_lab_study
+
+ROOT = Path(__file__).parents[3]
+COMMANDS = ("run", "check", "learn", "frc", "export", "validate", "report", "info", "doctor")
+
+
+def romgen_cli(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_every_command_explains_itself() -> None:
+    for command in COMMANDS:
+        assert romgen_cli(command, "--help").exit_code == 0
+    assert romgen_cli("--version").stdout.strip() == romgen.__version__
+
+
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c != "doctor"])
+def test_mistakes_are_one_line_and_exit_2(command: str, tmp_path: Path) -> None:
+    study = tmp_path / "study.toml"
+    study.write_text('[study]\nname = "a"\n[data]\nfiles = ["gone.mat"]\nsensors = ["x"]\ntraining = [0]\nsensor = 1\n')
+    result = romgen_cli(command, study)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert len(lines) == 2
+    assert lines[0].startswith("romgen: study.toml: [data] unknown key 'sensor'; did you mean 'sensors'?")
+    assert "no such file" in lines[1]
+
+
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c != "doctor"])
+def test_missing_file(command: str, tmp_path: Path) -> None:
+    result = romgen_cli(command, tmp_path / "gone.toml")
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_problems_as_json(tmp_path: Path) -> None:
+    result = romgen_cli("check", tmp_path / "gone.toml", "--json")
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["exit_code"] == 2
+
+
+def test_check_says_what_it_will_cost() -> None:
+    result = romgen_cli("check", ROOT / "models" / "clamped_panel")
+    assert result.exit_code == 0
+    assert "3 training and 2 validation ring-downs" in result.stdout
+    assert "GB" in result.stdout
+    document = json.loads(romgen_cli("check", ROOT / "models" / "clamped_panel", "--json").stdout)
+    assert document["estimate"]["dofs"] > 1000
+    assert romgen_cli("check", ROOT / "models" / "clamped_panel", "--quiet").stdout == ""
+
+
+def test_doctor_and_unknown_files(tmp_path: Path) -> None:
+    result = romgen_cli("doctor", "--json")
+    assert json.loads(result.stdout)["required"]["numpy"]
+    (tmp_path / "picture.png").write_bytes(b"x")
+    assert "unknown kind of file" in romgen_cli("info", tmp_path / "picture.png").stderr
+    for name in ("a.fmu", "a.h5", "a.json"):
+        (tmp_path / name).write_bytes(b"not one")
+        result = romgen_cli("info", tmp_path / name)
+        assert result.exit_code == 2, name
+        assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("failure", "code"), [(NumericalError("did not converge", where="preload"), 3), (KeyboardInterrupt(), 130)]
+)
+def test_failures_while_running(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException, code: int
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise failure
+
+    monkeypatch.setattr(run_command, "run_pipeline", fail)
+    result = romgen_cli("run", write_lab_study(tmp_path), "--run-dir", tmp_path)
+    assert result.exit_code == code
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_python_m_romgen_has_no_trace_and_no_colour(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "romgen", "run", str(tmp_path / "gone.toml")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr
+    assert "\x1b" not in done.stderr + done.stdout
+
+
+def test_a_study_from_start_to_end(tmp_path: Path) -> None:
+    study, folder = write_lab_study(tmp_path), tmp_path / "run folder ü"
+    learned = romgen_cli("learn", study, "--run-dir", folder)
+    assert learned.exit_code == 0, learned.stderr
+    assert "validation" in learned.stdout
+    exported = romgen_cli("export", study, "--run-dir", folder, "--json")
+    assert json.loads(exported.stdout)["path"] == "lab.fmu"
+    validated = romgen_cli("validate", study, "--run-dir", folder)
+    assert validated.exit_code == 0, validated.stderr
+    ran = romgen_cli("run", study, "--run-dir", folder)
+    assert ran.exit_code == 0, ran.stderr
+    assert str(folder / "report.html") in ran.stdout
+    assert romgen_cli("validate", folder / "lab.fmu").exit_code == 0
+    assert "lab: FMI 2.0" in romgen_cli("info", folder / "lab.fmu").stdout
+    assert "learn" in romgen_cli("info", folder).stdout
+    assert "learn.order = 3" in romgen_cli("info", folder / "summary.json").stdout
+    assert romgen_cli("frc", study, "--run-dir", folder).exit_code == 2
+    study.write_text(study.read_text() + "[acceptance]\nnmte_percent = 1e-9\n")
+    missed = romgen_cli("validate", study, "--run-dir", folder)
+    assert missed.exit_code == 4
+    assert "learn.nmte_percent.other" in missed.stderr
