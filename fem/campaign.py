@@ -94,7 +94,8 @@ def snap_back_starts(
     """Static states with the wanted modal coordinates, see ``hold_modes``."""
     states = []
     for number, eta in enumerate(etas, 1):
-        states.append(hold_modes(transient.model, transient.equilibrium, modes, eta))
+        solver = transient.settings.solver
+        states.append(hold_modes(transient.model, transient.equilibrium, modes, eta, solver=solver))
         if progress is not None:
             progress(number / len(etas))
     displacement = np.stack([s.u - transient.equilibrium.u for s in states], axis=1)

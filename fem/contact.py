@@ -112,7 +112,7 @@ class Contact:
 
     def dissipated(self, traction: FloatArray, slip: FloatArray, new_slip: FloatArray) -> FloatArray:
         """Work of friction over one increment sum w tau_t . (s_p_new - s_p), (n_case,) J; open points do none."""
-        tangential = traction.reshape(self.n_point, 3, -1)[:, 1:, :]
+        tangential = traction.reshape(self.n_point, 3, traction.shape[1])[:, 1:, :]
         return np.asarray(np.einsum("g,gdc,gdc->c", self.area, tangential, new_slip - slip))
 
     def _assemble(self, blocks: FloatArray) -> sp.csr_matrix:

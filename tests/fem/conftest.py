@@ -6,20 +6,24 @@ from dataclasses import dataclass
 
 import pytest
 
+from fem.campaign import modal_coordinates
 from fem.model import Model
 from fem.modes import ModalBasis, Rayleigh, rayleigh, solve_modes
 from fem.preload import StaticSettings, StaticState, solve_static
+from fem.snap_back import hold_modes
 from tests.fem.small_models import clamped_strip
 
 
 @dataclass(frozen=True)
 class Strip:
-    """The clamped strip, its equilibrium, four modes and damping."""
+    """The clamped strip, its equilibrium, four modes, damping, and its first mode held at a peak of 1 mm."""
 
     model: Model
     equilibrium: StaticState
     modes: ModalBasis
     damping: Rayleigh
+    held: StaticState
+    eta: float
 
 
 @pytest.fixture(scope="session")
@@ -28,4 +32,6 @@ def strip() -> Strip:
     model = clamped_strip()
     equilibrium = solve_static(model, model.load, StaticSettings(steps=2, solver="superlu"))
     modes = solve_modes(model, equilibrium, 4, solver="superlu")
-    return Strip(model, equilibrium, modes, rayleigh(modes, (0, 1), (0.004, 0.004)))
+    eta = modal_coordinates(modes, (1e-3,))
+    held = hold_modes(model, equilibrium, modes, eta, steps=4, solver="superlu")
+    return Strip(model, equilibrium, modes, rayleigh(modes, (0, 1), (0.004, 0.004)), held, float(eta[0]))
