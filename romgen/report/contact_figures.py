@@ -43,14 +43,14 @@ class _NearestPoint:
 
 
 def _nearest_point(interface: Interface) -> _NearestPoint:
-    """Pixels belong to the nearest point, but not beyond the width of its integration area."""
+    """Pixels belong to the nearest point, but not beyond twice the width of its integration area (stretched facets)."""
     plane = plane_axes(interface.points)
     flat, width = interface.points[:, plane], np.sqrt(interface.area)
     low, high = flat.min(axis=0) - 0.4 * width.min(), flat.max(axis=0) + 0.4 * width.min()
     pixel = (high - low).max() / _PIXELS
     x, y = (np.arange(low[k] + 0.5 * pixel, high[k], pixel) for k in range(2))
     distance, index = cKDTree(flat).query(np.stack(np.meshgrid(x, y), axis=-1))
-    near = np.where(distance <= width[index], index, -1)
+    near = np.where(distance <= 2.0 * width[index], index, -1)
     edges = 1e3 * np.array([low[0], low[0] + x.size * pixel, low[1], low[1] + y.size * pixel])
     return _NearestPoint(near, tuple(edges.tolist()), plane)
 
