@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import zipfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,11 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
             )
         if not path.is_file():
             raise InputError("no such file", where=str(path))
-        for name, t, x in read(path, sensors, unit):
+        try:
+            pairs = read(path, sensors, unit)
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            raise InputError(f"truncated, damaged or of another format ({error})", where=str(path)) from error
+        for name, t, x in pairs:
             where = f"{path.name}, trajectory '{name}'"
             _check(t, x, sensors, where)
             trajectories.append(Trajectory(_unique(name, trajectories), t, tuple(sensors), x))

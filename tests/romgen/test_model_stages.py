@@ -114,6 +114,14 @@ def test_unknown_trajectory(tmp_path: Path) -> None:
         read_data(data_context(tmp_path, training=["c", 0], validation=[7]))
 
 
+@pytest.mark.parametrize("suffix", [".h5", ".npz", ".mat", ".csv"])
+@pytest.mark.parametrize("content", [b"", b"not one \xff", b"PK\x03\x04half"])
+def test_damaged_data_file_is_one_line(tmp_path: Path, suffix: str, content: bytes) -> None:
+    (tmp_path / f"a{suffix}").write_bytes(content)
+    with pytest.raises(InputError, match=f"a{suffix}"):
+        read_data(data_context(tmp_path, files=[str(tmp_path / f"a{suffix}")]))
+
+
 def test_missing_finite_element_half_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "romgen.fe_stages", None)
     monkeypatch.delattr("romgen.fe_stages", raising=False)
