@@ -92,8 +92,8 @@ def homological_start(
     g, resonant : (m, n_term).
     """
     detuning = eigenvalues[:, None] - exponents @ zeta(eigenvalues)
-    B: ComplexArray = np.where(resonant, g, 0.0)
-    A: ComplexArray = np.where(resonant, 0.0, g) / np.where(resonant, 1.0, detuning)
+    B = np.where(resonant, g, 0.0).astype(np.complex128)
+    A = np.where(resonant, 0.0, g).astype(np.complex128) / np.where(resonant, 1.0, detuning)
     return A, B
 
 

@@ -16,16 +16,19 @@ from romgen.initial_window import fitted_start
 from romgen.manifold import Manifold, ManifoldFit, nmte_blocks
 from romgen.metrics import nmte_percent
 from romgen.normal_form import NormalFormFit, fit_normal_form
-from romgen.order_selection import OrderTable, choose_order
+from romgen.order_selection import OrderTable, choose_order, simulation_error
 from romgen.polynomial import PolynomialMap, evaluate, exponents
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, sensors, simulate
 from romgen.trajectory import Trajectory
+from romgen.trajectory_fit import fit_on_trajectories, is_long_enough
 
 # The full field is nearly linear plus quadratic in y; higher terms would cost n_dof numbers each.
 FIELD_ORDER = 3
+# A direct fit within this mean NMTE of the training data needs no refinement on trajectories.
+GOOD_PERCENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ def learn(
     reduced = [reduced_trajectory(trajectory, chart, settings) for trajectory in training]
     orders = choose_order(reduced, settings) if settings.order == "auto" else None
     order = orders.order if orders is not None else int(settings.order)
-    fit = fit_normal_form(reduced, order, settings.internal_resonance, settings.ridge)
+    fit = best_fit(reduced, order, settings)
     model = assemble(name, fit, reduced, settings, training[0].sensors, loads)
     full = _full_field(training, reduced, model, settings)
     held_out = [reduced_trajectory(trajectory, chart, settings) for trajectory in validation]
@@ -138,6 +141,20 @@ def learn(
         validation=tuple(trajectory_error(model, r, x, full) for r, x in zip(held_out, validation, strict=True)),
         notes=_notes([*training, *validation], chart),
     )
+
+
+def best_fit(training: Sequence[ReducedTrajectory], order: int, settings: LearnSettings) -> NormalFormFit:
+    """Return the normal form, from conjugacy or from whole trajectories, that simulates the training data better.
+
+    The conjugacy fit is exact for smooth data; friction and noise favour the fit on trajectories, which is tried where
+    the data are long enough and the conjugacy fit misses them by more than GOOD_PERCENT.
+    """
+    direct = fit_normal_form(training, order, settings.internal_resonance, settings.ridge)
+    error = simulation_error(direct, training)
+    if error < GOOD_PERCENT or not is_long_enough(training, direct.dynamics.eigenvalues):
+        return direct
+    on_trajectories = fit_on_trajectories(training, order, settings.internal_resonance, settings.ridge)
+    return on_trajectories if simulation_error(on_trajectories, training) < error else direct
 
 
 def reduced_trajectory(trajectory: Trajectory, chart: SensorChart | None, settings: LearnSettings) -> ReducedTrajectory:

@@ -32,7 +32,7 @@ class NormalFormFit:
     ----------
     dynamics : the polynomial vector field it was made from, with scale, eigenvalues and modal directions.
     resonance : the terms kept.
-    conjugacy : A, B, cost and deviations.
+    conjugacy : A, B, cost and deviations; None where the form was fitted on trajectories.
     normal_form : N, (m, n_term) over zeta, nonlinear terms, 1/s.
     chart : T, (2m, n_term) over zeta, w = Re(T zeta^E).
     inverse_chart : H, (m, n_term) over w.
@@ -41,7 +41,7 @@ class NormalFormFit:
 
     dynamics: ReducedDynamics
     resonance: ResonanceTable
-    conjugacy: ConjugacyFit
+    conjugacy: ConjugacyFit | None
     normal_form: PolynomialMap[np.complex128]
     chart: PolynomialMap[np.complex128]
     inverse_chart: PolynomialMap[np.complex128]

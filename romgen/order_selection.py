@@ -79,6 +79,14 @@ def cross_validation_error(training: Sequence[ReducedTrajectory], order: int, se
     return float(np.mean(errors))
 
 
+def simulation_error(fit: NormalFormFit, motions: Sequence[ReducedTrajectory]) -> float:
+    """Return the mean NMTE in percent of y / s over motions; inf where one diverges."""
+    try:
+        return float(np.mean([block_error(fit, motion) for motion in motions]))
+    except NumericalError:
+        return float("inf")
+
+
 def block_error(fit: NormalFormFit, block: ReducedTrajectory) -> float:
     """Return the NMTE in percent of y / s over a block, simulated from its first period."""
     model = autonomous_model(fit)

@@ -99,15 +99,16 @@ def refine(
             H = here.hessian + damping * np.diag(np.maximum(np.diag(here.hessian), 1e-30))
             change: FloatArray = -np.linalg.solve(H, here.gradient).astype(np.float64)
             trial_model, trial_segments = _moved(here.model, segments, change)
-            trial = _linearise(trial_model, trial_segments, (ridge, max_step), here.weight)
-            if trial.model.cost < here.model.cost:
+            cost = _cost(trial_model, trial_segments, (ridge, max_step), here.weight)
+            if cost < here.model.cost:
                 accepted = True
                 break
             damping *= 8.0
         if not accepted:
             break
-        gain = (here.model.cost - trial.model.cost) / here.model.cost
-        here, segments, damping = trial, trial_segments, max(damping / 8.0, 1e-9)
+        gain = (here.model.cost - cost) / here.model.cost
+        segments, damping = trial_segments, max(damping / 8.0, 1e-9)
+        here = _linearise(trial_model, segments, (ridge, max_step), here.weight)
         if gain < DECREASE:
             break
     return here.model, segments
@@ -165,26 +166,23 @@ def _linearise(
     """Simulate all segments, eliminate C, and return cost, gradient and Gauss-Newton Hessian."""
     ridge, max_step = settings
     m, E = len(model.eigenvalues), model.exponents
-    linear = np.eye(2 * m, dtype=np.int64)[:m]
-    table = (np.vstack([linear, E]), np.hstack([np.zeros((m, m)), model.B]))
     rows, terms = _parameters(model)
-    runs = [sensitivities(s.t, s.z0, model.eigenvalues, table, (rows, terms), max_step) for s in segments]
+    runs = _simulate(model, segments, (rows, terms), max_step)
     z = np.vstack([run[0] for run in runs])
     nothing = np.zeros(0)
     if not np.isfinite(z).all() or np.any(model.eigenvalues.real >= 0):
         return _Linearised(replace(model, cost=float("inf")), nothing, nothing, weight)
     q = np.vstack([s.q for s in segments])
-    phi = monomials(zeta(z), E)
-    C = np.zeros_like(model.C)
-    for j in range(m):
-        C[j, model.output[j]] = ridge_fit(phi[:, model.output[j]], q[:, j : j + 1] - z[:, j : j + 1], ridge)[0]
-    residual = q - z - phi @ C.T
-    norm = float(np.sum(np.abs(q) ** 2))
+    share = _shares(segments)
+    C, phi = _projected_output(model, z, q, share, ridge)
+    residual = share * (q - z - phi @ C.T)
+    norm = float(np.sum(np.abs(share * q) ** 2))
     J = _output_sensitivity(E, C, z, [run[1] for run in runs], len(rows))
     hessian, gradient = np.zeros((J.shape[2], J.shape[2])), np.zeros(J.shape[2])
     for j in range(m):
-        basis = phi[:, model.output[j]]
-        D = J[:, j] - basis @ ridge_fit(basis, J[:, j], ridge).T
+        basis = share * phi[:, model.output[j]]
+        column = share * J[:, j]
+        D = column - basis @ ridge_fit(basis, column, ridge).T
         stacked = np.vstack([D.real, D.imag])
         hessian += stacked.T @ stacked / norm
         gradient -= stacked.T @ np.concatenate([residual[:, j].real, residual[:, j].imag]) / norm
@@ -193,20 +191,67 @@ def _linearise(
     )
 
 
+def _simulate(
+    model: RefinedDynamics, segments: tuple[Segment, ...], parameters: tuple[IntArray, IntArray], max_step: float
+) -> list[tuple[ComplexArray, ComplexArray]]:
+    m = len(model.eigenvalues)
+    linear = np.eye(2 * m, dtype=np.int64)[:m]
+    table = (np.vstack([linear, model.exponents]), np.hstack([np.zeros((m, m)), model.B]))
+    return [sensitivities(s.t, s.z0, model.eigenvalues, table, parameters, max_step) for s in segments]
+
+
+def _projected_output(
+    model: RefinedDynamics, z: ComplexArray, q: ComplexArray, share: FloatArray, ridge: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the C that fits q - z best, and phi(z)."""
+    phi = monomials(zeta(z), model.exponents)
+    C = np.zeros_like(model.C)
+    for j, output in enumerate(model.output):
+        C[j, output] = ridge_fit(share * phi[:, output], share * (q[:, j : j + 1] - z[:, j : j + 1]), ridge)[0]
+    return C, phi
+
+
+def _shares(segments: tuple[Segment, ...]) -> FloatArray:
+    """Return the weight of each sample, (n_sample, 1): one over the largest abs(q) of its segment, as in the NMTE."""
+    weights = [np.full((len(s.t), 1), 1.0 / np.linalg.norm(s.q, axis=1).max()) for s in segments]
+    return np.vstack(weights)
+
+
+def _cost(
+    model: RefinedDynamics, segments: tuple[Segment, ...], settings: tuple[float, float], weight: FloatArray
+) -> float:
+    """Return the cost without derivatives; inf where a segment blows up or a mode does not decay."""
+    ridge, max_step = settings
+    none = np.zeros(0, dtype=np.int64)
+    z = np.vstack([run[0] for run in _simulate(model, segments, (none, none), max_step)])
+    if not np.isfinite(z).all() or np.any(model.eigenvalues.real >= 0):
+        return float("inf")
+    q = np.vstack([s.q for s in segments])
+    share = _shares(segments)
+    C, phi = _projected_output(model, z, q, share, ridge)
+    misfit = float(np.sum(np.abs(share * (q - z - phi @ C.T)) ** 2)) / float(np.sum(np.abs(share * q) ** 2))
+    return misfit + float(weight @ _tied(model, len(weight)) ** 2)
+
+
+def _tied(model: RefinedDynamics, n_unknown: int) -> FloatArray:
+    """Return what prior and ridge pull to zero: eigenvalue corrections and B, in (Re, Im) pairs, then zeros."""
+    rows, terms = np.nonzero(model.resonant)
+    values = np.concatenate([model.eigenvalues - model.reference, model.B[rows, terms]])
+    tied = np.zeros(n_unknown)
+    tied[: 2 * len(values) : 2], tied[1 : 2 * len(values) : 2] = values.real, values.imag
+    return tied
+
+
 def _regularised(
     model: RefinedDynamics, hessian: FloatArray, gradient: FloatArray, misfit: float, weight: FloatArray, ridge: float
 ) -> _Linearised:
     """Add the prior on the eigenvalues and the ridge on B; ridge weights are set at the first call and kept."""
     m = len(model.eigenvalues)
-    rows, terms = np.nonzero(model.resonant)
-    first, last = 2 * m, 2 * (m + len(rows))
+    first, last = 2 * m, 2 * (m + int(model.resonant.sum()))
     if not weight[first:last].any():
         weight = weight.copy()
         weight[first:last] = ridge * np.diag(hessian)[first:last]
-    value = np.zeros(len(weight))
-    correction, B = model.eigenvalues - model.reference, model.B[rows, terms]
-    value[:first:2], value[1:first:2] = correction.real, correction.imag
-    value[first:last:2], value[first + 1 : last : 2] = B.real, B.imag
+    value = _tied(model, len(weight))
     cost = misfit + float(weight @ value**2)
     return _Linearised(replace(model, cost=cost), hessian + np.diag(weight), gradient + weight * value, weight)
 
