@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import zipfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -46,7 +45,9 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
             raise InputError("no such file", where=str(path))
         try:
             pairs = read(path, sensors, unit)
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
+        except InputError:
+            raise
+        except Exception as error:  # h5py, numpy, scipy and zipfile each raise their own for a damaged file
             raise InputError(f"truncated, damaged or of another format ({error})", where=str(path)) from error
         for name, t, x in pairs:
             where = f"{path.name}, trajectory '{name}'"
@@ -127,7 +128,7 @@ def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
 
 
 def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
-    with np.load(path) as arrays:
+    with path.open("rb") as file, np.load(file) as arrays:
         names = sorted({key.rpartition("/")[0] for key in arrays.files if key.endswith("t")})
         pairs = []
         for name in names:
