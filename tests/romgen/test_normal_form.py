@@ -1,0 +1,153 @@
+"""Building blocks of the normal form: derivatives, resonances, substitution, conjugacy, sensitivities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from romgen.conjugacy import _cost, _normal_equations, _pack, _Problem
+from romgen.differences import first_derivative, resample, second_derivative
+from romgen.errors import NumericalError
+from romgen.manifold import ManifoldFit, lift, nmte_blocks
+from romgen.metrics import analytic_signal, instantaneous, nmte_percent, sqrt2_rms
+from romgen.polynomial import PolynomialMap, evaluate, exponents
+from romgen.reduced_dynamics import decaying_modes
+from romgen.resonance import automatic_resonance, integer_resonance, tolerance_resonance
+from romgen.substitution import substitute_linear
+from romgen.variational import sensitivities
+
+LAMBDA = np.array([-3.2 + 694.1j, -6.5 + 1232.2j])
+
+
+@pytest.mark.parametrize("derivative", [1, 2])
+def test_differences_are_of_order_eight(derivative: int) -> None:
+    errors, steps = [], [0.2, 0.1]
+    for h in steps:
+        t = np.arange(0.0, 4.0, h)
+        x = np.sin(2 * t)[:, None]
+        exact = (2 * np.cos(2 * t) if derivative == 1 else -4 * np.sin(2 * t))[4:-4, None]
+        numeric = first_derivative(x, h) if derivative == 1 else second_derivative(x, h)
+        errors.append(np.abs(numeric - exact).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(8.0, abs=0.3)
+
+
+def test_resampling_of_an_irregular_grid() -> None:
+    t = np.cumsum(0.01 + 0.002 * np.random.default_rng(0).random(200))
+    uniform, x = resample(t, np.sin(3 * t)[:, None], 0.01)
+    # degree 7 spline: error of order (3 * 0.012)^8 = 3e-12 times a constant below 1e2
+    assert x[:, 0] == pytest.approx(np.sin(3 * uniform), abs=1e-9)
+
+
+@pytest.mark.parametrize(("order", "count"), [(3, 3), (5, 10), (7, 22), (9, 40)])
+def test_exact_counts_of_one_to_two(order: int, count: int) -> None:
+    table = integer_resonance(LAMBDA, exponents(4, 2, order), (1, 2))
+    assert table.resonant.sum(axis=1).tolist() == [count, count]
+
+
+def test_gap_finds_one_to_two_and_no_resonance() -> None:
+    assert automatic_resonance(LAMBDA, exponents(4, 2, 5)).internal_resonance == (1, 2)
+    apart = automatic_resonance(np.array([-1 + 100j, -1 + 147j]), exponents(4, 2, 5))
+    assert apart.internal_resonance == ()
+    # z_j times abs(z_1)^2a abs(z_2)^2b of degree 3 and 5: 2 + 3 per row
+    assert apart.resonant.sum(axis=1).tolist() == [5, 5]
+    assert automatic_resonance(np.array([-1 + 100j]), exponents(2, 2, 5)).resonant.sum() == 2
+
+
+def test_tolerance_rule_of_the_published_order_five() -> None:
+    eigenvalues = np.array([-3.20834 + 694.11858j, -6.47685 + 1232.15362j])
+    table = tolerance_resonance(eigenvalues, exponents(4, 2, 5), 30 * 6.47685)
+    assert table.resonant.sum(axis=1).tolist() == [9, 9]
+
+
+def test_substitution_is_exact() -> None:
+    rng = np.random.default_rng(1)
+    table = exponents(3, 1, 4)
+    p = PolynomialMap(table, rng.normal(size=(2, len(table))) + 1j * rng.normal(size=(2, len(table))))
+    L = rng.normal(size=(3, 2)) + 1j * rng.normal(size=(3, 2))
+    x = rng.normal(size=(5, 2)) + 0j
+    assert evaluate(substitute_linear(p, L), x) == pytest.approx(evaluate(p, x @ L.T), rel=1e-11)
+
+
+def test_conjugacy_gradient_matches_finite_differences() -> None:
+    rng = np.random.default_rng(2)
+    E = exponents(4, 2, 3)
+    resonant = integer_resonance(LAMBDA, E, (1, 2)).resonant
+    q, q_dot = 0.4 * (rng.normal(size=(2, 30, 2)) + 1j * rng.normal(size=(2, 30, 2)))
+    c = 0.1 * (rng.normal(size=(2, 2, len(E))) + 1j * rng.normal(size=(2, 2, len(E))))
+    problem = _Problem(q, q_dot, LAMBDA / 700, E, resonant)
+    theta = _pack(c[0], c[1], resonant)
+    curvature, gradient, cost = _normal_equations(problem, theta)
+    assert cost == pytest.approx(_cost(problem, theta), rel=1e-12)
+    for k in range(0, len(theta), 7):
+        step = np.zeros_like(theta)
+        step[k] = 1e-5
+        slope = (_cost(problem, theta + step) - _cost(problem, theta - step)) / 2e-5
+        # central difference of a quartic: error of order step^2 times the curvature
+        assert 2 * gradient[k] == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(gradient).max())
+    assert np.array_equal(curvature, curvature.T)
+
+
+def test_sensitivities_match_finite_differences() -> None:
+    E = np.vstack([np.eye(4, dtype=np.int64)[:2], exponents(4, 2, 3)])
+    rng = np.random.default_rng(3)
+    C = 5.0 * (rng.normal(size=(2, len(E))) + 1j * rng.normal(size=(2, len(E))))
+    C[:, :2] = 0.0
+    t, z0 = np.linspace(0, 0.02, 41), np.array([0.3 + 0.1j, -0.2j])
+    rows, terms = np.array([0, 1, 0, 1]), np.array([0, 1, 7, 12])
+    S = sensitivities(t, z0, LAMBDA, (E, C), (rows, terms), 1e-4)[1]
+    none = np.zeros(0, dtype=np.int64)
+
+    def run(C: np.ndarray, z0: np.ndarray) -> np.ndarray:
+        return sensitivities(t, z0, LAMBDA, (E, C), (none, none), 1e-4)[0]
+
+    for p in range(4):
+        for part, unit in enumerate((1.0, 1j)):
+            step = np.zeros_like(C)
+            step[rows[p], terms[p]] = 1e-4 * unit
+            slope = (run(C + step, z0) - run(C - step, z0)) / 2e-4
+            assert S[:, :, 2 * p + part] == pytest.approx(slope, rel=1e-6, abs=1e-10)
+    for column, unit in (
+        (8, np.array([1, 0])),
+        (9, np.array([0, 1])),
+        (10, np.array([1j, 0])),
+        (11, np.array([0, 1j])),
+    ):
+        slope = (run(C, z0 + 1e-5 * unit) - run(C, z0 - 1e-5 * unit)) / 2e-5
+        assert S[:, :, column] == pytest.approx(slope, rel=1e-6, abs=1e-8)
+
+
+def test_growing_modes_are_refused() -> None:
+    with pytest.raises(NumericalError, match="not that of decaying oscillations"):
+        decaying_modes(np.array([[0.0, 1.0], [-4.0, 0.1]]))
+
+
+def test_streamed_manifold_recovers_a_polynomial_from_blocks() -> None:
+    rng = np.random.default_rng(4)
+    E, scale = exponents(2, 1, 3), np.array([1e-3, 2.0])
+    W, y = rng.normal(size=(7, len(E))), rng.uniform(-1, 1, size=(300, 2)) * np.array([1e-3, 2.0])
+    x = evaluate(PolynomialMap(E, W), y / scale)
+    fit = ManifoldFit(7, E, scale)
+    for rows in np.array_split(np.arange(300), 4):
+        fit.add(x[rows].astype(np.float32), y[rows])
+    manifold = fit.finish(0.0)
+    # single precision blocks: 6e-8 per entry, averaged over 300 samples
+    assert lift(manifold, y) == pytest.approx(x, abs=1e-6 * np.abs(x).max())
+    assert nmte_blocks(manifold, x.astype(np.float32), y) < 1e-4
+    given = ManifoldFit(7, E, scale, linear=W[:, :2] / scale)
+    given.add(x, y)
+    assert given.finish(0.0).coefficients == pytest.approx(W, abs=1e-10)
+
+
+def test_nmte_is_the_mean_distance_over_the_largest_norm() -> None:
+    x = np.array([[3.0, 4.0], [0.0, 0.0]])
+    assert nmte_percent(x, x + np.array([[0.0, 0.0], [0.0, 1.0]])) == pytest.approx(10.0)
+
+
+def test_measures_of_a_known_decay() -> None:
+    t = np.arange(0, 2, 1e-4)
+    x = np.exp(-3 * t) * np.cos(2 * np.pi * 110 * t)
+    measured = instantaneous(t, x + 0.3 * np.exp(-5 * t) * np.cos(2 * np.pi * 198 * t), (70.0, 150.0))
+    assert measured.frequency_hz == pytest.approx(110.0, rel=2e-3)
+    assert np.median(measured.damping_ratio) == pytest.approx(3 / (2 * np.pi * 110), rel=1e-2)
+    assert np.abs(analytic_signal(t, np.cos(2 * np.pi * 110 * t), (70, 150)))[5000:-5000] == pytest.approx(1, rel=1e-3)
+    assert sqrt2_rms(2 * np.cos(2 * np.pi * np.arange(100) / 100)[:, None] + 5) == pytest.approx(2.0)

@@ -1,0 +1,102 @@
+"""Trajectory files: round trips, units, and errors that name file, row and value."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from romgen.errors import InputError
+from romgen.trajectory import Trajectory
+from romgen.trajectory_files import read_trajectories, write_trajectories
+
+SENSORS = ("lower", "upper")
+T = np.linspace(0.0, 1.0, 11)
+X = np.column_stack([np.cos(T), np.sin(3 * T)])
+
+
+def cells(x: np.ndarray) -> np.ndarray:
+    value = np.empty((1, 2), dtype=object)
+    value[0, 0], value[0, 1] = T[None], x.T
+    return value
+
+
+@pytest.mark.parametrize("suffix", ["h5", "npz"])
+def test_round_trip_keeps_every_bit(tmp_path: Path, suffix: str) -> None:
+    written = [Trajectory("one", T, SENSORS, X), Trajectory("two", 2 * T, SENSORS, -X)]
+    write_trajectories(tmp_path / f"a.{suffix}", written)
+    read = read_trajectories([tmp_path / f"a.{suffix}"], SENSORS, "m")
+    assert [r.name for r in read] == ["one", "two"]
+    for r, w in zip(read, written, strict=True):
+        assert np.array_equal(r.t, w.t)
+        assert np.array_equal(r.displacement, w.displacement)
+
+
+def test_mat_cells_are_sensor_by_time_in_the_given_unit(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "a.mat", {"xData": cells(X)})
+    (read,) = read_trajectories([tmp_path / "a.mat"], SENSORS, "mm")
+    assert read.displacement == pytest.approx(1e-3 * X, rel=1e-15)
+
+
+def test_mat_v73_cells(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        group = file.create_group("#refs#")
+        t, x = group.create_dataset("a", data=T[:, None]), group.create_dataset("b", data=X)
+        file.create_dataset("xData", data=np.array([[t.ref], [x.ref]], dtype=h5py.ref_dtype), dtype=h5py.ref_dtype)
+    (read,) = read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
+    assert np.array_equal(read.displacement, X)
+
+
+def test_csv_units_of_the_header(tmp_path: Path) -> None:
+    rows = ["t [ms], upper [mm], other, lower [m]"]
+    rows += [f"{1e3 * t!r},{1e3 * x[1]!r},7,{x[0]!r}" for t, x in zip(T.tolist(), X.tolist(), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(rows), encoding="utf-8")
+    (read,) = read_trajectories([tmp_path / "a.csv"], SENSORS, "m")
+    assert read.t == pytest.approx(T, rel=1e-15)
+    assert read.displacement == pytest.approx(X, rel=1e-15)
+
+
+def test_names_of_several_files_are_unique(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        np.savez(tmp_path / folder / "run.npz", t=T, x=X)
+    read = read_trajectories([tmp_path / "a" / "run.npz", tmp_path / "b" / "run.npz"], SENSORS, "m")
+    assert [r.name for r in read] == ["run", "run_2"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("nan", r"row 3, column 'upper': not a finite number"),
+        ("time", r"row 5: time does not increase"),
+        ("constant", r"sensor 'lower': the sensor is constant"),
+        ("sensors", r"wrong number of sensors or samples; got \(11, 3\)"),
+    ],
+)
+def test_bad_data_are_named(tmp_path: Path, change: str, message: str) -> None:
+    t, x = T.copy(), X.copy()
+    if change == "nan":
+        x[3, 1] = np.nan
+    elif change == "time":
+        t[5] = t[4]
+    elif change == "constant":
+        x[:, 0] = 1.0
+    else:
+        x = np.column_stack([x, x[:, 0]])
+    np.savez(tmp_path / "run.npz", t=t, x=x)
+    with pytest.raises(InputError, match=message):
+        read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
+
+
+def test_csv_cell_that_is_no_number(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t [s],lower [m],upper [m]\n0,1,2\n1,x,2\n", encoding="utf-8")
+    with pytest.raises(InputError, match="a.csv, line 3, column 2: not a number"):
+        read_trajectories([tmp_path / "a.csv"], SENSORS, "m")
+
+
+def test_unknown_format(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="unknown trajectory format"):
+        read_trajectories([tmp_path / "a.xls"], SENSORS, "m")
