@@ -30,6 +30,9 @@ from fem.motion import MotionState, StepRecord
 from fem.preload import StaticState
 from fem.sparse_product import SparseProduct
 
+DIVERGED = 1e12
+"""Residual over the peak inertia force beyond which iterating on is pointless and overflows single precision."""
+
 Excitation = Callable[[float], FloatArray]
 
 
@@ -221,7 +224,7 @@ class Transient:
             active = ~(size <= self.settings.tolerance)
             if not active.any():
                 return a, force, strain, contact, iterations
-            if not np.isfinite(history[-1]):
+            if not history[-1] < DIVERGED:
                 break
             correction = -rotate(w, 1.0, self.precondition(rotate(w, -1.0, residual))) * self._mask
             if step is not None and previous is not None:
@@ -234,7 +237,7 @@ class Transient:
             "time step does not converge",
             where=f"step {old.step + 1}",
             value=f"relative residual {history[-1]:.2e}",
-            advice="use a smaller time step or a softer penalty",
+            advice="use a smaller time step, a smaller amplitude, or a start that has settled (snap-back)",
             history=tuple(history),
         )
 

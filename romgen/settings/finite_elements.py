@@ -142,7 +142,7 @@ class RingDownSettings(Settings):
     tolerance: float = Field(default=1e-4, gt=0.0, lt=1.0)
     snapshot_stride: int = Field(default=10, ge=1)
     segment_steps: int = Field(default=250, ge=1)
-    start: Literal["modal", "static"] = "modal"
+    start: Literal["modal", "static"] = "static"
     training: tuple[RingDownStart, ...] = Field(min_length=1)
     validation: tuple[RingDownStart, ...] = ()
 
