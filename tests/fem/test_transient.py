@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -19,18 +17,13 @@ from tests.fem.small_models import box, single
 STEP = 5e-5
 
 
-def make_transient(strip: Strip, **changes: object) -> Transient:
+def make_transient(strip: Strip, max_iterations: int = 60) -> Transient:
     """A transient of the strip for motions of about 1 mm in its first mode."""
     scale = float(np.linalg.norm(strip.modes.left[:, 0] * strip.modes.omega[0] ** 2 * strip.eta))
-    settings = TransientSettings(STEP, tolerance=1e-7, corrected_modes=1, solver="superlu")
-    return Transient(
-        strip.model,
-        strip.equilibrium,
-        strip.modes,
-        strip.damping,
-        replace(settings, **changes),  # type: ignore[arg-type]
-        force_scale=scale,
+    settings = TransientSettings(
+        STEP, tolerance=1e-7, max_iterations=max_iterations, corrected_modes=1, solver="superlu"
     )
+    return Transient(strip.model, strip.equilibrium, strip.modes, strip.damping, settings, force_scale=scale)
 
 
 def released(strip: Strip, transient: Transient) -> MotionState:
