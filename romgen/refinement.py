@@ -23,7 +23,7 @@ from romgen.variational import sensitivities
 # One standard deviation of the prior on eigenvalues: share of Re(lambda) and of Im(lambda), at data error PRIOR_ERROR.
 PRIOR_REAL, PRIOR_IMAG, PRIOR_ERROR = 0.1, 0.005, 0.02
 MAX_REJECTIONS = 12
-DECREASE = 1e-4
+DECREASE = 1e-5
 
 
 @dataclass(frozen=True)

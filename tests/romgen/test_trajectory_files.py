@@ -93,7 +93,7 @@ def test_bad_data_are_named(tmp_path: Path, change: str, message: str) -> None:
 
 def test_csv_cell_that_is_no_number(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t [s],lower [m],upper [m]\n0,1,2\n1,x,2\n", encoding="utf-8")
-    with pytest.raises(InputError, match="a.csv, line 3, column 2: not a number"):
+    with pytest.raises(InputError, match=r"a\.csv, line 3, column 2: not a number"):
         read_trajectories([tmp_path / "a.csv"], SENSORS, "m")
 
 
