@@ -59,7 +59,8 @@ def test_restart_from_balance_stays(strip: Strip) -> None:
 
 
 def test_progress_reports_the_load_factor() -> None:
-    model, seen = clamped_strip(clamp=100.0), []
+    model = clamped_strip(clamp=100.0)
+    seen: list[float] = []
     solve_static(model, model.load, StaticSettings(steps=3, solver="superlu"), progress=seen.append)
     assert seen == pytest.approx([1 / 3, 2 / 3, 1.0])
 

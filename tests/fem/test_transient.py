@@ -8,7 +8,7 @@ import pytest
 from fem.errors import FemConvergenceError
 from fem.model import Support
 from fem.modes import Rayleigh, solve_modes
-from fem.motion import MotionState
+from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, solve_static
 from fem.transient import Transient, TransientSettings
 from tests.fem.conftest import Strip
@@ -152,7 +152,7 @@ def test_static_base_acceleration_is_gravity() -> None:
 
 def test_step_that_does_not_converge_has_history(strip: Strip) -> None:
     transient = make_transient(strip, max_iterations=2)
-    good = []
+    good: list[StepRecord] = []
     with pytest.raises(FemConvergenceError, match=r"step 1: .*smaller time step") as caught:
         good.extend(transient.march(released(strip, transient), 3))
     assert not good

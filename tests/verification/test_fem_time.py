@@ -88,7 +88,7 @@ def test_v23_ledger_of_a_linear_ring_down(beam: tuple[Model, StaticState, ModalB
 def _balance(segment: CampaignSegment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stored, given and dissipated energies, (n_time,) J each."""
     kinetic, strain, contact, friction, damping, external = segment.energies[..., 0].T
-    return kinetic + strain + contact, external, friction + damping
+    return np.asarray(kinetic + strain + contact), external, np.asarray(friction + damping)
 
 
 def _frictional(h: float, n: int) -> tuple[CampaignSegment, float, np.ndarray]:
@@ -124,14 +124,14 @@ def _shear_work(model: Model, transient: Transient, state: MotionState, n: int) 
         work.append(work[-1] + float(np.einsum("g,gd,gd->", area, 0.5 * (shear + tangential), change)))
         stored.append(float(0.5 * area / stiffness @ (tangential**2).sum(axis=1)))
         shear, moved = tangential, slid
-    return np.array(work[1:]) - np.array(stored) + stored[0]
+    return np.asarray(np.array(work[1:]) - np.array(stored) + stored[0])
 
 
 def test_v23_ledger_of_a_ring_down_with_friction() -> None:
     """V23: E(0) - E(t) = damping + friction + contact storage, closed to 0.5 % of the released energy (the manual).
 
     The work of friction is counted a second time from tractions and relative motion; backward and trapezoidal sums
-    differ by one step of slip at every change between stick and slip, 5 %.
+    differ by the slip of one step at every change between stick and slip: measured 0.8 %, falling with h^2.
     """
     segment, released, work = _frictional(5e-5, 100)
     stored, given, taken = _balance(segment)
@@ -140,4 +140,4 @@ def test_v23_ledger_of_a_ring_down_with_friction() -> None:
     friction = segment.energies[:, 3, 0]
     assert friction[-1] > 0.02 * released, "the case should slip"
     assert np.all(np.diff(segment.energies[:, 3:5, 0], axis=0) >= -1e-15)
-    np.testing.assert_allclose(work, friction, atol=0.05 * friction[-1])
+    np.testing.assert_allclose(work, friction, atol=0.02 * friction[-1])
