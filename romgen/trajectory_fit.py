@@ -108,12 +108,16 @@ def _rates(
 
 
 def _segment(dynamics: ReducedDynamics, r: ReducedTrajectory, signal: ComplexArray) -> Segment:
-    """Return the whole trajectory after the distorted edge, thinned to a few samples per period of the fastest mode."""
-    first = _edge(r, dynamics.eigenvalues)
+    """Return the whole trajectory, thinned to a few samples per period of the fastest mode.
+
+    The start comes from the first undistorted sample of the signal, turned back by the linear part.
+    """
+    edge = _edge(r, dynamics.eigenvalues)
+    start = signal[edge] * np.exp(-dynamics.eigenvalues * (r.t[edge] - r.t[0]))
     period = 2.0 * np.pi / float(dynamics.eigenvalues.imag.max())
     stride = max(1, int(period / (SAMPLES_PER_PERIOD * (r.t[1] - r.t[0]))))
     q = modal_samples(dynamics, r)[0]
-    return Segment(r.t[first::stride], q[first::stride], signal[first])
+    return Segment(r.t[::stride], q[::stride], start)
 
 
 def _normal_form(
