@@ -20,16 +20,18 @@ from fem.transient import Transient
 
 @dataclass(frozen=True)
 class Starts:
-    """Where the ring-downs start, at rest.
+    """Where the motions start.
 
     Attributes
     ----------
     displacement : (n_dof, n_case) m from the equilibrium.
     slip : (n_point, 2, n_case) m, slip history of the interfaces.
+    velocity : (n_dof, n_case) m/s, None at rest.
     """
 
     displacement: FloatArray
     slip: FloatArray
+    velocity: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,12 @@ def modal_coordinates(modes: ModalBasis, peaks: Sequence[float]) -> FloatArray:
 def modal_starts(modes: ModalBasis, equilibrium: StaticState, etas: Sequence[FloatArray]) -> Starts:
     """Displacements along the mode shapes, u = Phi eta: everything else has to settle after the release."""
     displacement = np.stack([modes.shapes[:, : len(eta)] @ eta for eta in etas], axis=1)
-    return Starts(displacement, np.repeat(equilibrium.contact.slip, len(etas), axis=2))
+    return moving_starts(equilibrium, displacement, None)
+
+
+def moving_starts(equilibrium: StaticState, displacement: FloatArray, velocity: FloatArray | None) -> Starts:
+    """Any displacement and velocity (n_dof, n_case), with the slip history of the equilibrium."""
+    return Starts(displacement, np.repeat(equilibrium.contact.slip, displacement.shape[1], axis=2), velocity)
 
 
 def snap_back_starts(
@@ -99,7 +106,8 @@ def snap_back_starts(
         if progress is not None:
             progress(number / len(etas))
     displacement = np.stack([s.u - transient.equilibrium.u for s in states], axis=1)
-    return Starts(displacement, np.concatenate([s.contact.slip for s in states], axis=2))
+    slip = np.concatenate([s.contact.slip for s in states], axis=2)
+    return Starts(displacement, slip)
 
 
 def march_campaign(
@@ -122,7 +130,8 @@ def march_campaign(
     else:
         if starts is None:
             raise FemInputError("a campaign needs starts or a restart state", where="campaign")
-        state = transient.start(starts.displacement, np.zeros_like(starts.displacement), starts.slip)
+        velocity = np.zeros_like(starts.displacement) if starts.velocity is None else starts.velocity
+        state = transient.start(starts.displacement, velocity, starts.slip)
         rows.append(_observe(transient.observe(state), transient, observation))
     while state.step < n_step:
         for record in transient.march(state, min(segment_steps, n_step - state.step)):

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
 from fem.block import arch, graded, hex_block
-from fem.campaign import (
-    CampaignSegment,
-    Observation,
-    Starts,
-    march_campaign,
-    modal_coordinates,
-    modal_starts,
-    snap_back_starts,
-)
 from fem.contact import ContactState
 from fem.equilibrium import interface_states
 from fem.errors import FemConvergenceError, FemError
@@ -27,20 +18,15 @@ from fem.modes import ModalBasis, Rayleigh, damping_ratios, rayleigh
 from fem.modes import solve_modes as tangent_modes
 from fem.preload import StaticSettings, StaticState, solve_static
 from fem.sensor import Sensor, sensor_rows
-from fem.transient import Transient, TransientSettings
-from romgen.arrays import FloatArray, IntArray
-from romgen.differences import DROPPED, first_derivative, second_derivative
+from romgen.arrays import IntArray
 from romgen.errors import InputError, NumericalError
 from romgen.progress import Report
-from romgen.settings import BlockSettings, RingDownSettings, Study
-from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, Structure
-from romgen.trajectory import Trajectory
-
-RingDownSegment = CampaignSegment
+from romgen.settings import BlockSettings, Study
+from romgen.structure import Interface, Modes, Preload, Structure
 
 
 @contextmanager
-def _translated() -> Iterator[None]:
+def translated() -> Iterator[None]:
     """Raise the failures of ``fem`` as those of romgen, message and history kept."""
     try:
         yield
@@ -52,7 +38,7 @@ def _translated() -> Iterator[None]:
         raise InputError(error.what, where=error.where, value=error.value, advice=error.advice) from error
 
 
-@_translated()
+@translated()
 def build(study: Study) -> Model:
     """Mesh the blocks of a study and assemble them with their contacts, constraints and loads."""
     bodies = []
@@ -98,7 +84,7 @@ def _triangles(facets: IntArray) -> IntArray:
     return np.vstack([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
 
 
-@_translated()
+@translated()
 def solve_preload(study: Study, report: Report) -> Preload:
     """Find the static equilibrium under the loads of a study."""
     model = build(study)
@@ -123,7 +109,7 @@ def solve_preload(study: Study, report: Report) -> Preload:
     return Preload(state.u, interfaces, np.array(state.load_factors), np.array(state.residuals))
 
 
-def _equilibrium(model: Model, preload: Preload) -> StaticState:
+def equilibrium(model: Model, preload: Preload) -> StaticState:
     """Rebuild the converged state from its record; the anchor of every spring is s_p = s - tau_t / k_t."""
     contact = model.contact
     empty = np.empty((0, 3))
@@ -135,11 +121,11 @@ def _equilibrium(model: Model, preload: Preload) -> StaticState:
     return StaticState(preload.displacement, state, tuple(preload.load_factors), tuple(preload.residuals))
 
 
-@_translated()
+@translated()
 def solve_modes(study: Study, preload: Preload) -> Modes:
     """Find the modes about the preloaded state, their damping, loads and sensors."""
     model = build(study)
-    basis = tangent_modes(model, _equilibrium(model, preload), study.modes.count)
+    basis = tangent_modes(model, equilibrium(model, preload), study.modes.count)
     damping = _damping(study, basis)
     base = study.base_acceleration
     inertia = -basis.left.T @ model.direction(base.direction) if base else np.empty((study.modes.count, 0))
@@ -162,105 +148,3 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
 def _damping(study: Study, basis: ModalBasis) -> Rayleigh:
     first, second = study.modes.rayleigh_modes
     return rayleigh(basis, (first - 1, second - 1), study.modes.damping_ratio)
-
-
-def march_ringdowns(
-    study: Study, preload: Preload, modes: Modes, restart: CampaignSegment | None
-) -> Iterator[CampaignSegment]:
-    """Yield the missing segments of all ring-downs of a study, which march together."""
-    with _translated():
-        table = _ringdowns(study)
-        model = build(study)
-        equilibrium = _equilibrium(model, preload)
-        omega = 2.0 * np.pi * modes.frequency_hz
-        basis = ModalBasis(omega, modes.shapes, modes.left, model.elastic_tangent(equilibrium.u))
-        etas = _start_coordinates(study, basis)
-        count = len(etas[0])
-        inertia = [np.linalg.norm(modes.left[:, :count] @ (omega[:count] ** 2 * eta)) for eta in etas]
-        settings = TransientSettings(table.time_step, table.spectral_radius, table.tolerance, corrected_modes=count)
-        damping = Rayleigh(modes.alpha, modes.beta)
-        transient = Transient(model, equilibrium, basis, damping, settings, force_scale=float(max(inertia)))
-        yield from march_campaign(
-            transient,
-            Observation(basis, modes.sensor_matrix, table.snapshot_stride),
-            table.steps,
-            table.segment_steps,
-            starts=None if restart is not None else _starts(table, transient, basis, etas),
-            restart=None if restart is None else restart.state,
-        )
-
-
-def _ringdowns(study: Study) -> RingDownSettings:
-    if study.ringdowns is None:
-        raise InputError("the study has no ring-downs", where="[ringdowns]")
-    return study.ringdowns
-
-
-def _start_coordinates(study: Study, basis: ModalBasis) -> list[FloatArray]:
-    """Modal coordinates of every start up to the highest master mode; modes between the masters start at zero."""
-    masters = np.array(study.learn.master_modes) - 1
-    etas = []
-    for start in _ringdowns(study).starts:
-        peaks = np.zeros(masters.max() + 1)
-        peaks[masters] = start.amplitudes
-        etas.append(modal_coordinates(basis, tuple(peaks)))
-    return etas
-
-
-def _starts(table: RingDownSettings, transient: Transient, basis: ModalBasis, etas: Sequence[FloatArray]) -> Starts:
-    if table.start == "static":
-        return snap_back_starts(transient, basis, etas)
-    return modal_starts(basis, transient.equilibrium, etas)
-
-
-def join_ringdowns(segments: Sequence[CampaignSegment], study: Study, modes: Modes) -> tuple[RingDown, ...]:
-    """Join the segments of the campaign into one record per ring-down, in the order of the study."""
-    starts = _ringdowns(study).starts
-    return tuple(_ringdown(segments, study, modes, case, start.name) for case, start in enumerate(starts))
-
-
-def _ringdown(segments: Sequence[CampaignSegment], study: Study, modes: Modes, case: int, name: str) -> RingDown:
-    masters = np.array(study.learn.master_modes) - 1
-    step = _ringdowns(study).time_step
-    steps = np.concatenate([s.steps for s in segments])
-    displacement = np.concatenate([s.displacement[..., case] for s in segments])
-    velocity = np.concatenate([s.velocity[..., case] for s in segments])
-    eta, eta_dot, eta_ddot = (
-        np.concatenate([getattr(s, rate)[:, masters, case] for s in segments])
-        for rate in ("eta", "eta_dot", "eta_ddot")
-    )
-    trajectory = Trajectory(
-        name=name,
-        t=steps * step,
-        sensors=modes.sensors,
-        displacement=displacement,
-        velocity=_inside(first_derivative, displacement, step, velocity),
-        eta=eta,
-        eta_dot=_inside(first_derivative, eta, step, eta_dot),
-        eta_ddot=_inside(second_derivative, eta, step, eta_ddot),
-        snapshots=np.concatenate([s.snapshots[..., case] for s in segments]),
-        snapshot_index=np.searchsorted(steps, np.concatenate([s.snapshot_steps for s in segments])),
-    )
-    energies = np.concatenate([s.energies[..., case] for s in segments])
-    return RingDown(trajectory, _ledger(energies), np.concatenate([s.iterations[:, case] for s in segments]))
-
-
-def _inside(
-    derivative: Callable[[FloatArray, float], FloatArray], x: FloatArray, step: float, ends: FloatArray
-) -> FloatArray:
-    """Derivative of the computed motion, with the integrator's own values at the few samples of either end.
-
-    Generalised-alpha velocities and accelerations differ from the derivatives of its displacements by O((omega h)^2),
-    0.1 % at 200 Hz and 1e-4 s: a model learned from them would not reproduce the motion that it was learned from.
-    """
-    rates = ends.copy()
-    rates[DROPPED:-DROPPED] = derivative(x, step)
-    return rates
-
-
-def _ledger(energies: FloatArray) -> EnergyLedger:
-    """Turn the columns kinetic, strain, contact, friction, damping, external into a ledger with its imbalance."""
-    kinetic, strain, contact, friction, damping, external = energies.T
-    stored = kinetic + strain + contact
-    imbalance = stored - stored[0] + friction + damping - external
-    return EnergyLedger(kinetic, strain, contact, friction, damping, external, imbalance)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from romgen.backbone import Backbone, backbone
+from romgen.errors import InputError
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_response import forced_response
-from romgen.learning_stages import learned_model
+from romgen.forced_validation import ForcedValidation, compare, forced_motion, operating_points
+from romgen.learning_stages import learned, learned_model
+from romgen.model_stages import finite_elements, march, ringdown_settings
 from romgen.settings import Study
 from romgen.stage import Context, Stage
+from romgen.structure import Modes, Preload
 
 
 @dataclass(frozen=True)
@@ -26,15 +30,44 @@ class Backbones:
 
 def forced_stages(study: Study) -> tuple[Stage, ...]:
     """Return the stages: without levels there is no forced response."""
-    backbones = Stage("backbone", Backbones, ("learn",), (), compute_backbones)
-    if not study.forced_response.levels:
-        return (backbones,)
-    return (Stage("forced_response", ForcedResponse, ("learn",), ("forced_response",), compute_response), backbones)
+    stages = [Stage("backbone", Backbones, ("learn",), (), compute_backbones)]
+    if study.forced_response.levels:
+        stages.append(Stage("forced_response", ForcedResponse, ("learn",), ("forced_response",), compute_response))
+        if study.forced_validation is not None and study.data is None:
+            upstream = ("preload", "modes", "ringdowns", "learn", "forced_response")
+            tables = ("ringdowns", "forced_validation")
+            stages.append(Stage("forced_validation", ForcedValidation, upstream, tables, validate_forced))
+    return tuple(stages)
 
 
 def compute_response(context: Context) -> ForcedResponse:
     """Follow the frequency responses at all levels."""
     return forced_response(learned_model(context), context.study.forced_response)
+
+
+def validate_forced(context: Context) -> ForcedValidation:
+    """March the finite-element model at points of the frequency response, all together, and compare."""
+    study, table = context.study, context.study.forced_validation
+    record = learned(context)
+    if table is None or record.full_field is None:
+        raise InputError("needs full fields of the ring-downs", where="[forced_validation]")
+    model, response = record.model, context.record("forced_response", ForcedResponse)
+    points = operating_points(model, response, table.shares)
+    step = ringdown_settings(study).time_step
+    motion = forced_motion(model, record.full_field, points, round(table.duration / step))
+    preload, modes = context.record("preload", Preload), context.record("modes", Modes)
+    fe = finite_elements("fe_transients")
+    segments = march(
+        context, fe.Segment, lambda last: fe.march_forced(study, preload, modes, motion, last), table.duration
+    )
+    t, displacement = fe.join_sensors(segments, study)
+    column = modes.sensors.index(response.sensor)
+    return ForcedValidation(
+        tuple(
+            compare(model, point, t, displacement[:, column, case], response.sensor, response.measure)
+            for case, point in enumerate(points)
+        )
+    )
 
 
 def compute_backbones(context: Context) -> Backbones:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
+from typing import TYPE_CHECKING, TypeVar
 
 from romgen.errors import InputError
 from romgen.settings import DataSettings, RingDownSettings, Study
@@ -13,6 +16,10 @@ from romgen.structure import Modes, Preload, RingDown, Structure
 from romgen.trajectory import Trajectory
 from romgen.trajectory_files import read_trajectories
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Segment = TypeVar("Segment", bound="DataclassInstance")
 log = logging.getLogger(__name__)
 
 
@@ -66,59 +73,69 @@ def recorded(context: Context) -> Recorded:
 
 def build_mesh(context: Context) -> Structure:
     """Mesh the bodies and find the contact pairs."""
-    structure: Structure = _finite_elements().structure(context.study)
+    structure: Structure = finite_elements().structure(context.study)
     return structure
 
 
 def solve_preload(context: Context) -> Preload:
     """Find the static equilibrium under the clamping loads."""
-    preload: Preload = _finite_elements().solve_preload(context.study, context.report)
+    preload: Preload = finite_elements().solve_preload(context.study, context.report)
     return preload
 
 
 def solve_modes(context: Context) -> Modes:
     """Find the modes about the preloaded state."""
-    modes: Modes = _finite_elements().solve_modes(context.study, context.record("preload", Preload))
+    modes: Modes = finite_elements().solve_modes(context.study, context.record("preload", Preload))
     return modes
 
 
 def march_ringdowns(context: Context) -> RingDowns:
     """March all ring-downs together, from the last finished segment on, and join the segments."""
-    fe, study, settings = _finite_elements(), context.study, _ringdown_settings(context.study)
+    fe, study, settings = finite_elements("fe_transients"), context.study, ringdown_settings(context.study)
     preload, modes = context.record("preload", Preload), context.record("modes", Modes)
-    segments = context.segments()
-    if len(segments):
-        log.warning("continued after %d finished segments; wall time and memory are those of the rest", len(segments))
-    _tell(context, settings, len(segments))
-    for segment in fe.march_ringdowns(study, preload, modes, segments.last(fe.RingDownSegment)):
-        segments.append(segment)
-        _tell(context, settings, len(segments))
-    joined = fe.join_ringdowns(segments.load_all(fe.RingDownSegment), study, modes)
+    segments = march(
+        context, fe.Segment, lambda last: fe.march_ringdowns(study, preload, modes, last), settings.duration
+    )
+    joined = fe.join_ringdowns(segments, study, modes)
     count = len(settings.training)
     return RingDowns(joined[:count], joined[count:])
 
 
-def _tell(context: Context, settings: RingDownSettings, finished: int) -> None:
-    """Report how far the march is."""
-    steps = min(finished * settings.segment_steps, settings.steps)
-    context.report(steps / settings.steps, f"{steps * settings.time_step:.3f} of {settings.duration:.3f} s")
+def march(
+    context: Context, cls: type[Segment], missing: Callable[[Segment | None], Iterator[Segment]], duration: float
+) -> tuple[Segment, ...]:
+    """Store every segment as soon as it is finished, from the last stored one on, and return all of them.
+
+    Parameters
+    ----------
+    missing : yields the segments after a given one (None: from the start).
+    duration : of the whole march, s.
+    """
+    settings, segments = ringdown_settings(context.study), context.segments()
+    if len(segments):
+        log.warning("continued after %d finished segments; wall time and memory are those of the rest", len(segments))
+    for segment in missing(segments.last(cls)):
+        segments.append(segment)
+        done = min(len(segments) * settings.segment_steps * settings.time_step, duration)
+        context.report(done / duration, f"{done:.3f} of {duration:.3f} s")
+    return segments.load_all(cls)
 
 
-def _ringdown_settings(study: Study) -> RingDownSettings:
+def ringdown_settings(study: Study) -> RingDownSettings:
+    """Return the table [ringdowns]; a study without it raises ``InputError``."""
     if study.ringdowns is None:
         raise InputError("the study has no ring-downs", where="[ringdowns]")
     return study.ringdowns
 
 
-def _finite_elements() -> ModuleType:
-    """Import the finite-element half, which a study from data does without."""
+def finite_elements(module: str = "fe_stages") -> ModuleType:
+    """Import a door to the finite-element half, which a study from data does without."""
     try:
-        from romgen import fe_stages
+        return importlib.import_module(f"romgen.{module}")
     except ImportError as error:
         raise InputError(
             "a study with [blocks] needs the finite-element half", value=str(error), advice="pip install 'romgen[fem]'"
         ) from error
-    return fe_stages
 
 
 def read_data(context: Context) -> Recorded:

@@ -14,6 +14,7 @@ import romgen
 from romgen.fmu_stages import Exported, Validation
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
+from romgen.forced_validation import ForcedValidation
 from romgen.learning_stages import learning_summary
 from romgen.model_stages import RingDowns
 from romgen.runner import RunResult
@@ -34,7 +35,8 @@ def summarise(result: RunResult) -> dict[str, Any]:
     }
     for stage, (key, part) in PARTS.items():
         if stage in result.infos:
-            content[key] = content.get(key, {}) | part(context)
+            found = part(context)
+            content[key] = content.get(key, {}) | found if isinstance(found, dict) else found
     content["stages"] = {
         name: {"wall_s": info.wall_s, "peak_memory_bytes": info.peak_memory_bytes, "messages": list(info.messages)}
         for name, info in result.infos.items()
@@ -91,10 +93,10 @@ def _ringdowns(context: Context) -> dict[str, Any]:
 
 def _ringdown(item: RingDown) -> dict[str, float]:
     energy = item.energy
-    initial = float(energy.kinetic[0] + energy.strain[0] + energy.contact[0])
+    dissipated = float(energy.damping[-1] + energy.friction[-1])
     return {
         "peak_m": float(np.max(np.abs(item.trajectory.displacement))),
-        "energy_imbalance_percent": 100.0 * float(np.max(np.abs(energy.imbalance))) / initial,
+        "energy_imbalance_percent": 100.0 * float(np.max(np.abs(energy.imbalance))) / dissipated,
         "mean_iterations": float(np.mean(item.iterations[1:])),
     }
 
@@ -118,6 +120,12 @@ def _forced_response(context: Context) -> dict[str, Any]:
             for curve in response.curves
         ],
     }
+
+
+def _forced_validation(context: Context) -> list[dict[str, Any]]:
+    keys = ("load", "unit", "frequency_hz", "sensor", "measure", "rom_m", "fe_m", "error_percent", "drift_percent")
+    points = context.record("forced_validation", ForcedValidation).points
+    return [{key: getattr(point, key) for key in keys} for point in points]
 
 
 def _backbone(context: Context) -> dict[str, Any]:
@@ -152,12 +160,13 @@ def _validation(context: Context) -> dict[str, Any]:
     return part
 
 
-PARTS: dict[str, tuple[str, Callable[[Context], dict[str, Any]]]] = {
+PARTS: dict[str, tuple[str, Callable[[Context], Any]]] = {
     "preload": ("preload", _preload),
     "modes": ("modes", _modes),
     "ringdowns": ("ringdowns", _ringdowns),
     "learn": ("learn", learning_summary),
     "forced_response": ("forced_response", _forced_response),
+    "forced_validation": ("forced_validation", _forced_validation),
     "backbone": ("backbone", _backbone),
     "fmu": ("fmu", _export),
     "validation": ("fmu", _validation),

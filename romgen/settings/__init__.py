@@ -22,6 +22,7 @@ from romgen.settings.learning import (
     AcceptanceSettings,
     FmuSettings,
     ForcedResponseSettings,
+    ForcedValidationSettings,
     LearnSettings,
     ReportSettings,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "Estimate",
     "FmuSettings",
     "ForcedResponseSettings",
+    "ForcedValidationSettings",
     "LearnSettings",
     "LoadSettings",
     "MaterialSettings",

@@ -171,6 +171,8 @@ def _downstream_problems(study: Study) -> Iterator[str]:
     inputs = ("base_acceleration",) if study.base_acceleration is not None else ()
     if forced.levels and forced.input not in inputs:
         yield _unknown("[forced_response] input:", "load input", forced.input, inputs)
+    if study.forced_validation is not None and (study.data is not None or not forced.levels):
+        yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"
     for platform in study.fmu.platforms:
         if platform not in PLATFORMS:
             yield _unknown("[fmu] platforms:", "platform", platform, PLATFORMS)

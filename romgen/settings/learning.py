@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -28,6 +28,16 @@ class ForcedResponseSettings(Settings):
     sensor: str | None = None
     measure: Literal["max", "sqrt2_rms"] = "sqrt2_rms"
     frequency_range_hz: tuple[PositiveFrequency, PositiveFrequency] | None = None
+
+
+class ForcedValidationSettings(Settings):
+    """Table [forced_validation]: points of the frequency response that the finite-element model computes too.
+
+    Per level one point for each share of the largest stable amplitude; both models run for ``duration``.
+    """
+
+    shares: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = Field(default=(0.5, 0.9), min_length=1)
+    duration: PositiveTime = 0.3
 
 
 class FmuSettings(Settings):

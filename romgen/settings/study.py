@@ -24,6 +24,7 @@ from romgen.settings.learning import (
     AcceptanceSettings,
     FmuSettings,
     ForcedResponseSettings,
+    ForcedValidationSettings,
     LearnSettings,
     ReportSettings,
 )
@@ -53,6 +54,7 @@ class Study(Settings):
     data: DataSettings | None = None
     learn: LearnSettings = LearnSettings()
     forced_response: ForcedResponseSettings = ForcedResponseSettings()
+    forced_validation: ForcedValidationSettings | None = None
     fmu: FmuSettings = FmuSettings()
     report: ReportSettings = ReportSettings()
     acceptance: AcceptanceSettings = AcceptanceSettings()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from romgen import fe_stages
+from romgen import fe_stages, fe_transients
 from romgen.errors import InputError, NumericalError
 from romgen.settings import Study, load_study
 from romgen.structure import Modes, Preload
@@ -135,7 +135,7 @@ def test_equilibrium_is_rebuilt_from_its_record(solved: tuple[Study, Preload, Mo
     """The record keeps tractions; the anchors that follow from them must give the same tractions again."""
     study, preload, _ = solved
     model = fe_stages.build(study)
-    state = fe_stages._equilibrium(model, preload)
+    state = fe_stages.equilibrium(model, preload)
     again = model.contact.evaluate(model.contact.relative(preload.displacement[:, None]), state.contact.slip)
     scale = np.abs(state.contact.traction).max()
     np.testing.assert_allclose(again.traction, state.contact.traction, atol=1e-9 * scale)
@@ -158,12 +158,12 @@ def test_modes_record_is_complete(solved: tuple[Study, Preload, Modes]) -> None:
 
 def test_ringdowns_restart_and_join(solved: tuple[Study, Preload, Modes]) -> None:
     study, preload, modes = solved
-    segments = list(fe_stages.march_ringdowns(study, preload, modes, None))
-    resumed = list(fe_stages.march_ringdowns(study, preload, modes, segments[0]))
+    segments = list(fe_transients.march_ringdowns(study, preload, modes, None))
+    resumed = list(fe_transients.march_ringdowns(study, preload, modes, segments[0]))
     assert len(segments) == 3
     for again, first in zip(resumed, segments[1:], strict=True):
         assert same(again, first)
-    strong, weak = fe_stages.join_ringdowns(segments, study, modes)
+    strong, weak = fe_transients.join_ringdowns(segments, study, modes)
     assert (strong.trajectory.name, weak.trajectory.name) == ("strong", "weak")
     t = strong.trajectory.t
     np.testing.assert_allclose(t, 5e-5 * np.arange(21), rtol=1e-12)
@@ -213,7 +213,7 @@ def test_record_of_other_interfaces_is_another_state(solved: tuple[Study, Preloa
     first = replace(preload.interfaces[0], traction=preload.interfaces[0].traction + 1e5)
     changed = replace(preload, interfaces=(first, *preload.interfaces[1:]))
     model = fe_stages.build(study)
-    ours, other = fe_stages._equilibrium(model, preload), fe_stages._equilibrium(model, changed)
+    ours, other = fe_stages.equilibrium(model, preload), fe_stages.equilibrium(model, changed)
     n = len(first.area)
     k = model.contact.law[:n, 1:2]
     np.testing.assert_allclose((ours.contact.slip - other.contact.slip)[:n, :, 0] * k, 1e5, rtol=1e-6)

@@ -36,9 +36,9 @@ class Segment:
 
 
 class FakeElements:
-    """Stands for romgen.fe_stages: counts steps instead of solving them."""
+    """Stands for romgen.fe_transients: counts steps instead of solving them."""
 
-    RingDownSegment = Segment
+    Segment = Segment
 
     def __init__(self, fail_at: int | None = None) -> None:
         self.fail_at, self.starts = fail_at, []
@@ -83,10 +83,10 @@ def upstream() -> tuple[Stage, ...]:
 def test_killed_march_continues(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = Study.model_validate(STUDY)
     first, second = FakeElements(fail_at=600), FakeElements()
-    monkeypatch.setattr(model_stages, "_finite_elements", lambda: first)
+    monkeypatch.setattr(model_stages, "finite_elements", lambda module: first)
     with pytest.raises(KeyboardInterrupt):
         execute(upstream(), study, tmp_path)
-    monkeypatch.setattr(model_stages, "_finite_elements", lambda: second)
+    monkeypatch.setattr(model_stages, "finite_elements", lambda module: second)
     result = execute(upstream(), study, tmp_path)
     assert (first.starts, second.starts) == ([0], [500])
     ringdowns = result.context.record("ringdowns", RingDowns)

@@ -45,7 +45,9 @@ def ring_down(name: str) -> RingDown:
     t = np.array([0.0, 1.0, 2.0])
     trajectory = Trajectory(name, t, ("tip",), np.array([[2e-3], [-3e-3], [1e-3]]))
     zero = np.zeros(3)
-    energy = EnergyLedger(zero, np.array([4.0, 2.0, 1.0]), zero, zero, zero, zero, np.array([0.0, 0.01, -0.02]))
+    energy = EnergyLedger(
+        zero, zero, zero, np.array([0.0, 0.5, 1.0]), np.array([0.0, 2.0, 3.0]), zero, np.array([0.0, 0.01, -0.02])
+    )
     return RingDown(trajectory, energy, np.array([0, 3, 5]))
 
 
