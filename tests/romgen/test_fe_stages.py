@@ -10,6 +10,7 @@ import pytest
 
 from romgen import fe_stages, fe_transients
 from romgen.errors import InputError, NumericalError
+from romgen.forced_validation import ForcedMotion
 from romgen.settings import Study, load_study
 from romgen.structure import Modes, Preload
 from tests.records import same
@@ -224,3 +225,27 @@ def test_study_file_is_read(tmp_path: Path) -> None:
     path.write_text(STUDY_TOML.replace("cells_x = [3, 1]", "cells_x = [3]"), encoding="utf-8")
     with pytest.raises(InputError, match="cells_x"):
         load_study(path)
+
+
+def test_forced_march_follows_the_linear_steady_state(solved: tuple[Study, Preload, Modes]) -> None:
+    """Small motions about the preload follow eta_1 = Re(X exp(i W t)), X = L a/(omega^2 - W^2 + 2i zeta omega W).
+
+    Both cases start on that orbit in mode 1; the step errs by (W h)^2/12 of the forcing and more near resonance,
+    and C couples the modes through the stuck joints: 1 % of the larger orbit, measured 0.6 %.
+    """
+    study, preload, modes = solved
+    omega, zeta, load = 2.0 * np.pi * modes.frequency_hz[0], modes.damping_ratio[0], modes.modal_load[0, 0]
+    drive = omega * np.array([0.3, 1.2])
+    level = 1e-6 * omega**2 / abs(load) * np.ones(2) * 1e-2
+    X = load * level / (omega**2 - drive**2 + 2j * zeta * omega * drive)
+    motion = ForcedMotion(
+        np.outer(modes.shapes[:, 0], X.real), np.outer(modes.shapes[:, 0], (1j * drive * X).real), level, drive, 40
+    )
+    segments = list(fe_transients.march_forced(study, preload, modes, motion, None))
+    t, sensors = fe_transients.join_sensors(segments, study)
+    eta = np.concatenate([s.eta for s in segments])[:, 0, :]
+    expected = (X * np.exp(1j * np.outer(t, drive))).real
+    np.testing.assert_allclose(eta, expected, atol=1e-2 * np.abs(X).max())
+    assert sensors.shape == (41, 1, 2)
+    resumed = list(fe_transients.march_forced(study, preload, modes, motion, segments[0]))
+    assert same(resumed[-1], segments[-1])
