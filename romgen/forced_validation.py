@@ -18,8 +18,8 @@ from romgen.manifold import Manifold, lift
 from romgen.reduced_model import ReducedModel
 from romgen.simulate import coordinates, sensors, simulate
 
-# Long enough for the transient that the harmonic start leaves: exp(-zeta omega t) < 1e-3 at 0.4 % and 100 Hz.
-SETTLING_S = 3.0
+# Decay times of the slowest mode: what the harmonic start leaves of a transient falls to exp(-10) = 5e-5.
+SETTLING = 10.0
 # Samples per period of the input, piecewise linear: its amplitude is short by (pi / n)^2 / 3, 1e-5 here.
 SAMPLES = 512
 MEASURED_PERIODS = 5
@@ -120,7 +120,7 @@ def _amplitude(curve: ForcedCurve, response: ForcedResponse) -> FloatArray:
 
 def _settled(model: ReducedModel, curve: ForcedCurve, row: int) -> OperatingPoint:
     frequency = float(curve.frequency_hz[row])
-    periods = int(np.ceil(SETTLING_S * frequency))
+    periods = int(np.ceil(SETTLING / np.abs(model.eigenvalues.real).min() * frequency))
     t = np.arange(periods * SAMPLES + 1) / (SAMPLES * frequency)
     z = simulate(model, t, curve.q[row], _cosine(model, curve.level, frequency, t))
     return OperatingPoint(curve.level, curve.unit, frequency, z[-1])

@@ -73,19 +73,19 @@ def recorded(context: Context) -> Recorded:
 
 def build_mesh(context: Context) -> Structure:
     """Mesh the bodies and find the contact pairs."""
-    structure: Structure = finite_elements().structure(context.study)
+    structure: Structure = finite_elements("fe_stages").structure(context.study)
     return structure
 
 
 def solve_preload(context: Context) -> Preload:
     """Find the static equilibrium under the clamping loads."""
-    preload: Preload = finite_elements().solve_preload(context.study, context.report)
+    preload: Preload = finite_elements("fe_stages").solve_preload(context.study, context.report)
     return preload
 
 
 def solve_modes(context: Context) -> Modes:
     """Find the modes about the preloaded state."""
-    modes: Modes = finite_elements().solve_modes(context.study, context.record("preload", Preload))
+    modes: Modes = finite_elements("fe_stages").solve_modes(context.study, context.record("preload", Preload))
     return modes
 
 
@@ -128,7 +128,7 @@ def ringdown_settings(study: Study) -> RingDownSettings:
     return study.ringdowns
 
 
-def finite_elements(module: str = "fe_stages") -> ModuleType:
+def finite_elements(module: str) -> ModuleType:
     """Import a door to the finite-element half, which a study from data does without."""
     try:
         return importlib.import_module(f"romgen.{module}")

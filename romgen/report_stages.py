@@ -8,10 +8,13 @@ from romgen.fmu.check import SEED
 from romgen.fmu_stages import Exported, Validation
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
-from romgen.learning_stages import learned_model, reconstructions
+from romgen.forced_validation import ForcedValidation
+from romgen.learn import Learned
+from romgen.learning_stages import learned, reconstructions
 from romgen.model_stages import RingDowns
+from romgen.polar_form import polar_text
 from romgen.provenance import Provenance, collect_provenance
-from romgen.report.inputs import ReportInputs, StageCost
+from romgen.report.inputs import OrderTrial, ReportInputs, StageCost
 from romgen.report.write import ReportFiles, write_report
 from romgen.settings import Study, study_warnings
 from romgen.stage import Context, Stage, study_key
@@ -46,6 +49,8 @@ def report_inputs(context: Context) -> ReportInputs:
     exported = _optional(context, "fmu", Exported)
     validation = _optional(context, "validation", Validation)
     backbones = _optional(context, "backbone", Backbones)
+    forced = _optional(context, "forced_validation", ForcedValidation)
+    record = learned(context)
     return ReportInputs(
         study=study.name,
         title=study.report.title,
@@ -54,8 +59,12 @@ def report_inputs(context: Context) -> ReportInputs:
         modes=_optional(context, "modes", Modes),
         ring_downs=() if ringdowns is None else ringdowns.training + ringdowns.validation,
         reconstructions=reconstructions(context),
-        model=learned_model(context),
+        model=record.model,
+        polar_form=polar_text(record.model),
+        resonance_reason=record.fit.resonance.reason,
+        orders=_orders(record),
         forced=_optional(context, "forced_response", ForcedResponse),
+        forced_points=() if forced is None else forced.points,
         backbones=() if backbones is None else backbones.curves,
         sensor=study.forced_response.sensor,
         measure=study.forced_response.measure,
@@ -69,6 +78,15 @@ def report_inputs(context: Context) -> ReportInputs:
         vtu=study.report.vtu,
         limits=study.acceptance,
     )
+
+
+def _orders(record: Learned) -> tuple[OrderTrial, ...]:
+    """The orders that cross-validation over the training motions tried."""
+    table = record.orders
+    if table is None:
+        return ()
+    trials = zip(table.tried.tolist(), table.nmte_percent.tolist(), strict=True)
+    return tuple(OrderTrial(order, error, order == record.order) for order, error in trials)
 
 
 def _optional(context: Context, stage: str, cls: type[Record]) -> Record | None:

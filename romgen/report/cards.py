@@ -37,6 +37,15 @@ def nmte_card(inputs: ReportInputs) -> list[Card]:
     return [Card("Validation NMTE", f"{worst.nmte_percent:.2f}", "%", note, passed)]
 
 
+def forced_card(inputs: ReportInputs) -> list[Card]:
+    """The worst forced amplitude against the finite-element model; it is a finding and carries no limit."""
+    if not inputs.forced_points:
+        return []
+    worst = max(inputs.forced_points, key=lambda point: abs(point.error_percent))
+    note = f"worst of {len(inputs.forced_points)} points computed by finite elements"
+    return [Card("Forced amplitude error", f"{abs(worst.error_percent):.2f}", "%", note)]
+
+
 def preload_card(inputs: ReportInputs) -> list[Card]:
     """Largest difference between contact force and applied force."""
     known = [] if inputs.preload is None else [i for i in inputs.preload.interfaces if np.isfinite(i.applied_force_n)]
@@ -70,5 +79,5 @@ def time_card(inputs: ReportInputs) -> list[Card]:
 
 def cards(inputs: ReportInputs) -> tuple[Card, ...]:
     """All headline numbers that this study has."""
-    builders = (frequency_cards, nmte_card, preload_card, fmu_card, time_card)
+    builders = (frequency_cards, nmte_card, forced_card, preload_card, fmu_card, time_card)
     return tuple(card for build in builders for card in build(inputs))

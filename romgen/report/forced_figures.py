@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from romgen.arrays import BoolArray, FloatArray
 from romgen.backbone import Backbone
 from romgen.forced_curve import ForcedCurve, ForcedResponse
+from romgen.forced_validation import ForcedPoint
 from romgen.reduced_model import ReducedModel
 from romgen.report.backbone_figures import MEASURE_NAMES, backbone_amplitude
 from romgen.report.blocks import FigureBlock, TableBlock
@@ -56,7 +57,7 @@ def _level_colours(curves: Sequence[ForcedCurve]) -> dict[float, str]:
     return {level: CYCLE[k % len(CYCLE)] for k, level in enumerate(levels)}
 
 
-def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool) -> None:
+def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool, with_points: bool) -> None:
     """Levels by colour, the rest by line style."""
     colours = _level_colours(curves)
     unit = unit_text(curves[0].unit)
@@ -66,18 +67,23 @@ def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool) -> N
         Line2D([], [], color=GREY, linestyle="--", label="unstable"),
     ]
     handles.append(Line2D([], [], color=GREY, marker="o", mfc="white", linestyle="", label="fold"))
+    if with_points:
+        handles.append(Line2D([], [], color=GREY, marker="x", mew=2.0, linestyle="", label="finite elements"))
     if with_backbone:
         handles.append(Line2D([], [], color=BLACK, linestyle=":", label="backbone"))
     axes.legend(handles=handles, loc="upper right")
 
 
-def response_figure(response: ForcedResponse, backbones: tuple[Backbone, ...]) -> FigureBlock:
+def response_figure(
+    response: ForcedResponse, backbones: tuple[Backbone, ...], points: tuple[ForcedPoint, ...] = ()
+) -> FigureBlock:
     """Displacement amplitude against forcing frequency at all levels, backbones overlaid.
 
     Parameters
     ----------
     response : curves of all levels.
     backbones : only those inside the drawn frequencies are shown.
+    points : full finite-element runs, drawn as crosses.
     """
     figure = new_figure(4.4)
     axes = figure.add_subplot()
@@ -86,17 +92,19 @@ def response_figure(response: ForcedResponse, backbones: tuple[Backbone, ...]) -
         y = curve_amplitude(response, curve)
         _draw_branch(axes, curve, 1e3 * y, colours[curve.level])
         tables.append(_table(response, curve))
+    for point in points:
+        axes.plot(point.frequency_hz, 1e3 * point.fe_m, "x", color=colours[point.load], markersize=8, mew=2.0)
     axes.set_xlim(*_window(response))
     axes.set_ylim(bottom=0.0)
     drawn = [curve for curve in backbones if _overlay(axes, curve, response)]
-    _legend(axes, response.curves, bool(drawn))
+    _legend(axes, response.curves, bool(drawn), bool(points))
     measure = MEASURE_NAMES[response.measure]
     label(axes, "forcing frequency [Hz]", f"{measure} of {response.sensor} [mm]", "frequency response")
     caption = (
         f"Forced response of the reduced model: amplitude of sensor “{response.sensor}” ({measure} over one period, "
         "about the rest state, mean not removed). The level is the peak value of a cosine on the input. Solid: stable; "
-        "dashed: unstable; circles: folds, where a sweep jumps; thin: beyond the trained range. Shaded: amplitudes "
-        "that the first backbone reaches inside the trained range."
+        "dashed: unstable; circles: folds, where a sweep jumps; crosses: finite elements; thin: beyond the trained "
+        "range. Shaded: amplitudes that the first backbone reaches inside the trained range."
     )
     return FigureBlock("frequency_response", figure, caption, tuple(tables))
 

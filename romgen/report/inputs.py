@@ -12,6 +12,7 @@ from romgen.arrays import FloatArray
 from romgen.backbone import Backbone
 from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.forced_curve import ForcedResponse
+from romgen.forced_validation import ForcedPoint
 from romgen.lifted_orbit import Measure
 from romgen.provenance import Provenance
 from romgen.reduced_model import ReducedModel
@@ -56,16 +57,11 @@ class StageCost:
 
 @dataclass(frozen=True)
 class OrderTrial:
-    """One polynomial order that was tried: worst NMTE in percent over training and over held-out motions (nan: none).
-
-    ``chosen`` marks the order of the model; ``note`` says why an order was passed over.
-    """
+    """One polynomial order that was tried, its cross-validated error in percent, and whether the model has it."""
 
     order: int
-    training_percent: float
-    held_out_percent: float
+    error_percent: float
     chosen: bool
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -85,6 +81,7 @@ class ReportInputs:
     coefficient_deviation : (m, n_term) 1/s, standard deviation of abs of each normal-form coefficient.
     orders : the polynomial orders that were tried.
     forced : frequency response at all levels.
+    forced_points : points of it that the finite-element model computed too.
     backbones : free vibration of the reduced model, one per mode and kind.
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
     fmu_export, pythonfmu_export, fmu_check : the exported units and how well they repeat the Python model.
@@ -110,6 +107,7 @@ class ReportInputs:
     coefficient_deviation: FloatArray | None = None
     orders: tuple[OrderTrial, ...] = ()
     forced: ForcedResponse | None = None
+    forced_points: tuple[ForcedPoint, ...] = ()
     backbones: tuple[Backbone, ...] = ()
     sensor: str | None = None
     measure: Measure = "sqrt2_rms"

@@ -88,11 +88,10 @@ def order_table(orders: tuple[OrderTrial, ...]) -> TableBlock:
     rows = tuple(
         (
             f"{trial.order}",
-            f"{trial.training_percent:.3f}",
-            f"{trial.held_out_percent:.3f}" if np.isfinite(trial.held_out_percent) else "not used",
-            "chosen" if trial.chosen else trial.note,
+            f"{trial.error_percent:.3f}" if np.isfinite(trial.error_percent) else "no stable model",
+            "chosen" if trial.chosen else "",
         )
         for trial in orders
     )
-    caption = "Orders that were tried: worst NMTE over the motions of each kind."
-    return TableBlock(caption, ("order", "training [%]", "held out [%]", "verdict"), rows)
+    caption = "Orders that were tried, judged by cross-validation inside the training motions alone."
+    return TableBlock(caption, ("order", "mean NMTE of held-out blocks [%]", "verdict"), rows)

@@ -14,6 +14,7 @@ from romgen.report.contact_figures import contact_figure, convergence_figure, re
 from romgen.report.cost_figures import cost_figure, cost_table
 from romgen.report.fmu_tables import check_table, export_table, problem_listing, replay_table
 from romgen.report.forced_figures import modal_figure, response_figure, response_table
+from romgen.report.forced_points import forced_points_figure, forced_points_table
 from romgen.report.inputs import ReportInputs
 from romgen.report.instantaneous_figures import instantaneous_figure, long_enough
 from romgen.report.mode_tables import frequency_table, ratio_table
@@ -125,7 +126,11 @@ def forced_section(inputs: ReportInputs) -> Section | None:
         return None
     modal: tuple[Block, ...] = () if inputs.model is None else (modal_figure(response, inputs.model),)
     notes = tuple(TextBlock(f"{note[:1].upper()}{note[1:]}.") for note in response.notes)
-    blocks = (response_figure(response, inputs.backbones), response_table(response), *modal, *notes)
+    checked: tuple[Block, ...] = ()
+    if inputs.forced_points:
+        checked = (forced_points_table(inputs.forced_points), forced_points_figure(inputs.forced_points))
+    figure = response_figure(response, inputs.backbones, inputs.forced_points)
+    blocks = (figure, *checked, response_table(response), *modal, *notes)
     return Section("forced", "Forced response", blocks)
 
 

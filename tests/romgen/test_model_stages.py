@@ -126,7 +126,7 @@ def test_missing_finite_element_half_is_one_line(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "romgen.fe_stages", None)
     monkeypatch.delattr("romgen.fe_stages", raising=False)
     with pytest.raises(InputError, match=r"pip install 'romgen\[fem\]'"):
-        model_stages._finite_elements()
+        model_stages.finite_elements("fe_stages")
 
 
 BLOCKED = """
