@@ -27,8 +27,8 @@ def forced_points_table(points: tuple[ForcedPoint, ...]) -> TableBlock:
     first = points[0]
     caption = (
         f"{MEASURE_NAMES[first.measure]} of sensor “{first.sensor}” over the last {MEASURED_PERIODS} periods. Both "
-        "models start on the orbit of the reduced model and are forced for the same time. Drift: how much the amplitude "
-        "of the finite-element model still changed over the second half; where it is not small, its own "
+        "models start on the orbit of the reduced model and are forced for the same time. Drift: how much the "
+        "amplitude of the finite-element model still changed over the second half; where it is not small, its own "
         "orbit lies further off."
     )
     header = ("base acceleration", "frequency [Hz]", "reduced [mm]", "finite elements [mm]", "error [%]", "drift [%]")
