@@ -59,7 +59,8 @@ class CampaignSegment:
     steps : (n_time,) step numbers.
     eta, eta_dot, eta_ddot : (n_time, n_mode, n_case) m kg^0.5 and per s, s^2; eta_ddot = Phi' (p - f - C v).
     displacement, velocity : (n_time, n_sensor, n_case) m, m/s.
-    energies : (n_time, 6, n_case) J: kinetic, strain, contact, then friction, damping, external work since t = 0.
+    energies : (n_time, 6, n_case) J: kinetic, strain, contact, relative to the equilibrium, then friction, damping,
+        external work since t = 0.
     iterations : (n_time, n_case).
     snapshots : (n_snapshot, n_dof, n_case) m from the equilibrium; snapshot_steps : (n_snapshot,).
     state : where the next segment starts.
@@ -159,7 +160,7 @@ def _observe(record: StepRecord, transient: Transient, observation: Observation)
         modes.shapes.T @ record.net_force,
         sensors @ moved,
         sensors @ state.v,
-        np.concatenate([record.energies, state.work]),
+        np.concatenate([record.energies - transient.rest_energies, state.work]),
         record.iterations,
     )
     kept = state.step % observation.stride == 0

@@ -70,6 +70,8 @@ class Transient:
     ----------
     force_scale : N, to which residuals are compared: peak inertia force of the intended motion.
     base_acceleration : t -> (n_case,) m/s^2 along ``base_direction``, or None.
+
+    ``rest_energies`` (3, 1) J are kinetic, strain and contact energy of the equilibrium.
     """
 
     def __init__(
@@ -104,6 +106,9 @@ class Transient:
         self._pull = SparseProduct(model.contact.operator.T.tocsr())
         self._correction = self._modal_inertia(modes)
         self._rotation = NodalRotation(model)
+        strain = self._force(equilibrium.u[:, None], equilibrium.contact)[1]
+        stored = model.contact.stored_energy(equilibrium.contact.traction)
+        self.rest_energies = np.stack([np.zeros(1), strain, stored])
 
     def _factor(self, matrix: sp.csr_matrix) -> LinearSolver:
         solver = make_solver(self.settings.solver, symmetric=True, single=True)

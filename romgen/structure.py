@@ -116,8 +116,8 @@ class EnergyLedger:
     """Energies in J at every time of a transient; imbalance = what the scheme itself gains or loses.
 
     imbalance = kinetic + strain + contact + friction + damping - external - initial sum.
-    All arrays (n_time,): kinetic, strain and contact are stored, the preload included; friction and damping are
-    dissipated since t = 0; external is the work of the dead loads and of the base since t = 0.
+    All arrays (n_time,): kinetic, strain and contact are stored, relative to the preloaded state; friction and damping
+    are dissipated since t = 0; external is the work of the dead loads and of the base since t = 0.
     """
 
     kinetic: FloatArray = field(metadata={"unit": "J", "axes": "time"})
