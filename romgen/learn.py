@@ -11,7 +11,7 @@ import numpy.typing as npt
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory, SensorChart, modal_chart, sensor_chart
 from romgen.differences import is_uniform
-from romgen.errors import InputError
+from romgen.errors import InputError, NumericalError
 from romgen.initial_window import fitted_start
 from romgen.manifold import Manifold, ManifoldFit, nmte_blocks
 from romgen.metrics import nmte_percent
@@ -21,7 +21,7 @@ from romgen.polynomial import PolynomialMap, evaluate, exponents
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
-from romgen.simulate import coordinates, sensors, simulate
+from romgen.simulate import coordinates, free_motion, initial_state, sensors
 from romgen.trajectory import Trajectory
 from romgen.trajectory_fit import fit_on_trajectories, is_long_enough
 
@@ -53,11 +53,12 @@ class TrajectoryError:
     Attributes
     ----------
     name : of the trajectory.
-    nmte_percent : NMTE in full displacement coordinates where snapshots exist, else of the sensors.
+    nmte_percent : NMTE in full displacement coordinates where snapshots exist, else of the sensors; inf where the model
+        diverges.
     sensor_nmte_percent : NMTE of the sensor displacements.
     static_percent : NMTE of the sensors lifted from the true reduced coordinates: the error of the manifold alone.
     start : (m,) z of the model at t[0].
-    t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m.
+    t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m, predicted is nan from a divergence on.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Learned:
     full_field : manifold of all degrees of freedom; None without snapshots.
     order : of the normal form; orders : how it was chosen, None where it was given.
     training, validation : errors; nothing of the validation trajectories enters the model.
-    notes : what was resampled or left out.
+    notes : what was resampled or left out, how the normal form was fitted, which motions diverge.
     """
 
     model: ReducedModel
@@ -214,16 +215,25 @@ def trajectory_error(
     model: ReducedModel, r: ReducedTrajectory, trajectory: Trajectory, full: Manifold | None
 ) -> TrajectoryError:
     """Simulate from the first window of a trajectory and compare with all of it."""
-    z0 = fitted_start(model, r)
-    z = simulate(model, r.t, z0)
+    z0, z = _from_first_window(model, r)
+    finite = np.isfinite(z).all()
     predicted = sensors(model, z)[0]
-    sensor_error = nmte_percent(r.displacement, predicted)
+    sensor_error = nmte_percent(r.displacement, predicted) if finite else float("inf")
     error = sensor_error
-    if full is not None and trajectory.snapshots is not None and trajectory.snapshot_index is not None:
+    if finite and full is not None and trajectory.snapshots is not None and trajectory.snapshot_index is not None:
         rows, snapshots = _snapshot_rows(trajectory, r)
         error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
     static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
     return TrajectoryError(r.name, error, sensor_error, static, z0, r.t, r.displacement, predicted)
+
+
+def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, ComplexArray]:
+    """Return the start and the motion of the model, nan from a divergence on."""
+    try:
+        z0 = fitted_start(model, r)
+    except NumericalError:
+        z0 = initial_state(model, r.y[0])
+    return z0, free_motion(model, r.t, z0)
 
 
 def _snapshot_rows(trajectory: Trajectory, r: ReducedTrajectory) -> tuple[IntArray, npt.NDArray[np.float32]]:

@@ -20,6 +20,8 @@ from romgen.substitution import substitute_linear
 
 # Rows used by the conjugacy fit: a few thousand phases and amplitudes determine all coefficients.
 FIT_SAMPLES = 4000
+# Terms above degree 3 take a ridge 10^degree times stronger: few motions leave them free between their amplitudes.
+FREE_DEGREE, GRADE = 3, 10.0
 
 Resonance = tuple[int, ...] | Literal["auto"]
 
@@ -112,10 +114,17 @@ def grow_conjugacy(
         else:
             more = ((0, 0), (0, n_term - fit.A.shape[1]))
             start = np.pad(fit.A, more), np.pad(fit.B, more)
-        fit = fit_conjugacy(samples, dynamics.eigenvalues, E, resonant, start, ridge)
+        fit = fit_conjugacy(samples, dynamics.eigenvalues, E, resonant, start, graded_ridge(ridge, E))
     if fit is None:
         raise NumericalError("the order leaves no nonlinear term", where="normal form", value=int(degree.max()))
     return fit
+
+
+def graded_ridge(ridge: float, exponents: IntArray) -> FloatArray:
+    """Return the ridge of each term, (n_term,): ridge up to degree 3, ridge 10^degree above."""
+    degree = exponents.sum(axis=1)
+    weights: FloatArray = ridge * np.where(degree > FREE_DEGREE, GRADE ** degree.astype(np.float64), 1.0)
+    return weights
 
 
 def modal_terms(dynamics: ReducedDynamics, q: ComplexArray, exponents: IntArray, ridge: float) -> ComplexArray:

@@ -14,31 +14,41 @@ from romgen.initial_window import fitted_start
 from romgen.metrics import nmte_percent
 from romgen.normal_form import NormalFormFit, fit_normal_form
 from romgen.polynomial import PolynomialMap
+from romgen.reduced_dynamics import modal_samples
 from romgen.reduced_model import ReducedModel
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate
 
 CANDIDATES = (3, 5, 7)
-# Alternate blocks train and test, so both folds see all amplitudes.
+# Alternate blocks train and test; eight per trajectory leave several beats of two modes in each.
 BLOCKS, FOLDS = 8, 2
 # A higher order must be this much better: below it is noise of the blocks.
 IMPROVEMENT = 0.9
+# A block that diverges, or misses by more, counts with this NMTE in percent: the motion was not predicted at all.
+LOST_PERCENT = 100.0
 
 
 @dataclass(frozen=True)
 class OrderTable:
     """Cross-validated error of each order tried.
 
+    Held-out blocks whose modal amplitudes exceed those of the blocks fitted are not scored: a polynomial promises
+    nothing there. So the first block of a decay, its largest amplitudes, usually only trains.
+
     Attributes
     ----------
     order : the lowest order that the next one does not improve by a tenth.
     tried : (n_tried,) orders.
-    nmte_percent : (n_tried,) mean NMTE of reduced coordinates on held-out blocks; inf where a fit or run failed.
+    nmte_percent : (n_tried,) mean NMTE of reduced coordinates on held-out blocks within the amplitudes of the fit;
+        a block that diverges counts 100 %; inf where a fit failed.
+    scored, lost : (n_tried,) number of blocks in the mean, and how many of them counted 100 %.
     """
 
     order: int
     tried: IntArray = field(metadata={"unit": "1", "axes": "order"})
     nmte_percent: FloatArray = field(metadata={"unit": "%", "axes": "order"})
+    scored: IntArray = field(metadata={"unit": "1", "axes": "order"})
+    lost: IntArray = field(metadata={"unit": "1", "axes": "order"})
 
 
 def choose_order(training: Sequence[ReducedTrajectory], settings: LearnSettings) -> OrderTable:
@@ -46,52 +56,64 @@ def choose_order(training: Sequence[ReducedTrajectory], settings: LearnSettings)
 
     Raises
     ------
-    NumericalError : no order gives a model that survives its held-out blocks.
+    NumericalError : no order can be fitted, or all lose every block.
     """
     tried: list[int] = []
-    errors: list[float] = []
+    errors: list[FloatArray] = []
+    means: list[float] = []
     best = -1
     for order in CANDIDATES:
         tried.append(order)
-        errors.append(cross_validation_error(training, order, settings))
-        if best >= 0 and not errors[-1] < IMPROVEMENT * errors[best]:
+        errors.append(held_out_errors(training, order, settings))
+        means.append(float(errors[-1].mean()) if errors[-1].size else float("inf"))
+        if best >= 0 and not means[-1] < IMPROVEMENT * means[best]:
             break
-        if np.isfinite(errors[-1]):
-            best = len(errors) - 1
+        if means[-1] < LOST_PERCENT:
+            best = len(tried) - 1
     if best < 0:
         raise NumericalError(
             "no order gives a stable model", where="learn order", value=tried, advice="give longer or cleaner decays"
         )
-    return OrderTable(tried[best], np.array(tried), np.array(errors))
+    scored = np.array([e.size for e in errors])
+    lost = np.array([int((e >= LOST_PERCENT).sum()) for e in errors])
+    return OrderTable(tried[best], np.array(tried), np.array(means), scored, lost)
 
 
-def cross_validation_error(training: Sequence[ReducedTrajectory], order: int, settings: LearnSettings) -> float:
-    """Return the mean NMTE in percent over held-out blocks; inf where a fit or a run fails."""
-    errors = []
+def held_out_errors(training: Sequence[ReducedTrajectory], order: int, settings: LearnSettings) -> FloatArray:
+    """Return the NMTE in percent, at most 100, of each held-out block in range; none where a fit fails."""
+    errors: list[float] = []
     for fold in range(FOLDS):
         held_out = [block for r in training for block in _blocks(r)[fold::FOLDS]]
         rest = [block for r in training for k, block in enumerate(_blocks(r)) if k % FOLDS != fold]
         try:
             fit = fit_normal_form(rest, order, settings.internal_resonance, settings.ridge)
-            errors += [block_error(fit, block) for block in held_out]
         except NumericalError:
-            return float("inf")
-    return float(np.mean(errors))
+            return np.zeros(0)
+        largest = np.max([modal_amplitudes(fit, block) for block in rest], axis=0)
+        inside = [block for block in held_out if np.all(modal_amplitudes(fit, block) <= largest)]
+        errors += [min(motion_error(fit, block), LOST_PERCENT) for block in inside]
+    return np.array(errors)
+
+
+def modal_amplitudes(fit: NormalFormFit, r: ReducedTrajectory) -> FloatArray:
+    """Return the largest abs(q_j) of a motion, (m,), q the modal coordinates of the linear part."""
+    largest: FloatArray = np.abs(modal_samples(fit.dynamics, r)[0]).max(axis=0)
+    return largest
 
 
 def simulation_error(fit: NormalFormFit, motions: Sequence[ReducedTrajectory]) -> float:
     """Return the mean NMTE in percent of y / s over motions; inf where one diverges."""
+    return float(np.mean([motion_error(fit, motion) for motion in motions]))
+
+
+def motion_error(fit: NormalFormFit, r: ReducedTrajectory) -> float:
+    """Return the NMTE in percent of y / s over a motion, simulated from its first periods; inf where it diverges."""
+    model = autonomous_model(fit)
     try:
-        return float(np.mean([block_error(fit, motion) for motion in motions]))
+        z = simulate(model, r.t, fitted_start(model, r))
     except NumericalError:
         return float("inf")
-
-
-def block_error(fit: NormalFormFit, block: ReducedTrajectory) -> float:
-    """Return the NMTE in percent of y / s over a block, simulated from its first period."""
-    model = autonomous_model(fit)
-    z = simulate(model, block.t, fitted_start(model, block))
-    return nmte_percent(block.y / model.scale, coordinates(model, z) / model.scale)
+    return nmte_percent(r.y / model.scale, coordinates(model, z) / model.scale)
 
 
 def autonomous_model(fit: NormalFormFit) -> ReducedModel:

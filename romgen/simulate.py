@@ -17,6 +17,7 @@ Hold = Literal["constant", "linear"]
 # The polished chart inverse stops at rounding; Newton from H converges quadratically or not at all.
 NEWTON_TOLERANCE = 1e-13
 NEWTON_STEPS = 20
+BLOW_UP = 1e3
 
 
 def simulate(
@@ -58,6 +59,21 @@ def simulate(
             value=f"first non-finite state at t = {t[np.argmin(finite)]:.6g} s, start abs(z) = {np.abs(z0)}",
             advice=f"stay near the trained amplitudes abs(z) <= {model.trained_amplitude}",
         )
+    return z
+
+
+def free_motion(model: ReducedModel, t: FloatArray, z0: ComplexArray) -> ComplexArray:
+    """Integrate without input as ``simulate``, but return nan from where a state leaves all bounds.
+
+    Bounds are BLOW_UP times the trained amplitude; a model that gets there has no meaning left.
+    """
+    start, rise = _modal_inputs(model, t, None, "constant")
+    nf, step = model.normal_form, largest_step(model.eigenvalues)
+    z = march(t, z0.astype(np.complex128), model.eigenvalues, nf.exponents, nf.coefficients, start, rise, step)
+    with np.errstate(invalid="ignore", over="ignore"):
+        lost = ~(np.abs(z) <= BLOW_UP * model.trained_amplitude.max()).all(axis=1)
+    if lost.any():
+        z[int(lost.argmax()) :] = np.nan
     return z
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from romgen.conjugacy import _cost, _normal_equations, _pack, _Problem
+from romgen.arrays import ComplexArray
+from romgen.conjugacy_residual import ConjugacyProblem, linearise, residual, solve_step
 from romgen.differences import first_derivative, resample, second_derivative
 from romgen.errors import NumericalError
 from romgen.manifold import ManifoldFit, lift, nmte_blocks
@@ -68,23 +69,47 @@ def test_substitution_is_exact() -> None:
     assert evaluate(substitute_linear(p, L), x) == pytest.approx(evaluate(p, x @ L.T), rel=1e-11)
 
 
-def test_conjugacy_gradient_matches_finite_differences() -> None:
+def conjugacy_example(n_sample: int = 30) -> tuple[ConjugacyProblem, ComplexArray]:
     rng = np.random.default_rng(2)
     E = exponents(4, 2, 3)
     resonant = integer_resonance(LAMBDA, E, (1, 2)).resonant
-    q, q_dot = 0.4 * (rng.normal(size=(2, 30, 2)) + 1j * rng.normal(size=(2, 30, 2)))
-    c = 0.1 * (rng.normal(size=(2, 2, len(E))) + 1j * rng.normal(size=(2, 2, len(E))))
-    problem = _Problem(q, q_dot, LAMBDA / 700, E, resonant)
-    theta = _pack(c[0], c[1], resonant)
-    curvature, gradient, cost = _normal_equations(problem, theta)
-    assert cost == pytest.approx(_cost(problem, theta), rel=1e-12)
-    for k in range(0, len(theta), 7):
-        step = np.zeros_like(theta)
-        step[k] = 1e-5
-        slope = (_cost(problem, theta + step) - _cost(problem, theta - step)) / 2e-5
-        # central difference of a quartic: error of order step^2 times the curvature
-        assert 2 * gradient[k] == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(gradient).max())
-    assert np.array_equal(curvature, curvature.T)
+    q, q_dot = 0.4 * (rng.normal(size=(2, n_sample, 2)) + 1j * rng.normal(size=(2, n_sample, 2)))
+    theta = 0.1 * (rng.normal(size=(2, len(E))) + 1j * rng.normal(size=(2, len(E))))
+    return ConjugacyProblem(q, q_dot, LAMBDA / 700, E, resonant), theta
+
+
+def test_conjugacy_products_match_finite_differences() -> None:
+    problem, theta = conjugacy_example()
+    here, _ = linearise(problem, theta)
+    assert np.allclose(here.r, residual(problem, theta), rtol=1e-13)
+    rng = np.random.default_rng(3)
+    for direction in (1.0, 1j):
+        change = 1e-5 * direction * rng.normal(size=theta.shape)
+        slope = 0.5 * (residual(problem, theta + change) - residual(problem, theta - change))
+        # central difference: third order in a step of 1e-5
+        assert here.forward(change) == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(slope).max())
+        weights = rng.normal(size=(*here.r.shape, 2)) @ np.array([1.0, 1j])
+        left, right = np.vdot(weights, here.forward(change)).real, np.vdot(here.adjoint(weights), change).real
+        assert left == pytest.approx(right * problem.samples, rel=1e-12)
+
+
+def test_conjugate_gradients_solve_the_normal_equations() -> None:
+    problem, theta = conjugacy_example(200)
+    here, rows = linearise(problem, 0.1 * theta)
+    n = 2 * theta.size
+    J = np.empty((2 * problem.samples, n))
+    for k in range(n):
+        unit = np.zeros(theta.size, dtype=complex)
+        unit[k % theta.size] = 1.0 if k < theta.size else 1j
+        column = here.forward(unit.reshape(theta.shape)).ravel()
+        J[:, k] = np.concatenate([column.real, column.imag])
+    weight = 1e-3 * rows.diagonal
+    slope = here.adjoint(here.r)
+    H = J.T @ J / problem.samples + np.diag(np.tile(weight.ravel(), 2))
+    exact = np.linalg.solve(H, np.concatenate([slope.real.ravel(), slope.imag.ravel()]))
+    step = solve_step(here, rows, slope, weight, 0.0).ravel()
+    # the iteration stops at a relative residual of 1e-4 in the norm of the preconditioner
+    assert np.concatenate([step.real, step.imag]) == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
 
 
 def test_sensitivities_match_finite_differences() -> None:
