@@ -46,19 +46,33 @@ class Cells:
 
     def internal_force(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Internal force (n_dof, n_case) in N and strain energy (n_case,) in J at u (n_dof, n_case) in m."""
-        n_cell, n_local = self.nodes.shape
-        forces = np.empty((n_cell, n_local, 3, u.shape[1]))
-        energies = np.empty((n_cell, u.shape[1]))
-        element_forces(self.gradients, self.weights, self.nodes, self.lame, u, forces, energies)
-        out = np.zeros_like(u)
-        gather(self.pointers, self.entries, forces.reshape(-1, 3, u.shape[1]), out)
-        return out, energies.sum(axis=0)
+        force, _, energy = self.forces(u, u, 0.0)
+        return force, energy
 
-    def element_tangents(self, u: FloatArray) -> FloatArray:
-        """Cell tangents (n_cell, n_local, n_local, 3, 3) in N/m at u (n_dof,) in m."""
+    def forces(self, u: FloatArray, v: FloatArray, beta: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Elastic and viscous force (n_dof, n_case) in N and strain energy (n_case,) in J.
+
+        u, v (n_dof, n_case) m and m/s; S_v = beta C:E' in s; beta = 0 gives no viscous force.
+        """
+        n_cell, n_local = self.nodes.shape
+        n_case = u.shape[1]
+        elastic = np.empty((n_cell, n_local, 3, n_case))
+        viscous = np.empty((n_cell, n_local, 3, n_case)) if beta > 0.0 else np.empty((0, 0, 3, n_case))
+        energies = np.empty((n_cell, n_case))
+        element_forces(self.gradients, self.weights, self.nodes, self.lame, u, v, beta, elastic, viscous, energies)
+        sums = []
+        for parts in (elastic, viscous):
+            total = np.zeros_like(u)
+            if parts.size:
+                gather(self.pointers, self.entries, parts.reshape(-1, 3, n_case), total)
+            sums.append(total)
+        return sums[0], sums[1], energies.sum(axis=0)
+
+    def element_tangents(self, u: FloatArray, *, geometric: bool = True) -> FloatArray:
+        """Cell tangents (n_cell, n_local, n_local, 3, 3) N/m at u (n_dof,) m, without stress stiffening on request."""
         n_cell, n_local = self.nodes.shape
         tangents = np.empty((n_cell, n_local, n_local, 3, 3))
-        element_tangents(self.gradients, self.weights, self.nodes, self.lame, u, tangents)
+        element_tangents(self.gradients, self.weights, self.nodes, self.lame, u, float(geometric), tangents)
         return tangents
 
     def assemble(self, blocks: FloatArray) -> sp.csr_matrix:

@@ -21,10 +21,15 @@ def element_forces(
     cells: IntArray,
     lame: FloatArray,
     u: FloatArray,
+    v: FloatArray,
+    beta: float,
     forces: FloatArray,
+    viscous: FloatArray,
     energies: FloatArray,
 ) -> None:
-    """f_a = sum_q w P grad N_a and the strain energy sum_q w S:E/2 of every cell and case.
+    """f_a = sum_q w F S grad N_a, the same with S_v = beta C:E' and the strain energy sum_q w S:E/2 of every cell.
+
+    E' = sym(F' grad v) is the rate of the Green-Lagrange strain, so that a rotation is not damped at any amplitude.
 
     Parameters
     ----------
@@ -32,8 +37,9 @@ def element_forces(
     weights : (n_cell, n_point) m^3.
     cells : (n_cell, n_local).
     lame : (n_cell, 2) lambda and mu, Pa.
-    u : (n_dof, n_case) m.
-    forces : (n_cell, n_local, 3, n_case) N, overwritten.
+    u, v : (n_dof, n_case) m and m/s.
+    beta : s; 0 leaves ``viscous`` alone and does not read v.
+    forces, viscous : (n_cell, n_local, 3, n_case) N, overwritten.
     energies : (n_cell, n_case) J, overwritten.
 
     Source: Bonet & Wood, Nonlinear Continuum Mechanics for FE Analysis, 2nd ed., eqs. (6.23), (9.12).
@@ -41,41 +47,83 @@ def element_forces(
     n_cell, n_point, _, n_local = gradients.shape
     n_case = u.shape[1]
     for e in prange(n_cell):
-        ue = np.empty((3, n_local))
-        fe = np.empty((3, n_local))
-        F = np.empty((3, 3))
-        S = np.empty((3, 3))
-        P = np.empty((3, 3))
+        ue, ve = np.empty((3, n_local)), np.empty((3, n_local))
+        fe, ge = np.empty((3, n_local)), np.empty((3, n_local))
+        F, S, P = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+        D, Sv, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
         lam, mu = lame[e, 0], lame[e, 1]
         for c in range(n_case):
-            for a in range(n_local):
-                for i in range(3):
-                    ue[i, a] = u[3 * cells[e, a] + i, c]
-                    fe[i, a] = 0.0
+            _gather_cell(u, cells[e], c, ue)
+            fe[:] = 0.0
+            if beta > 0.0:
+                _gather_cell(v, cells[e], c, ve)
+                ge[:] = 0.0
             energy = 0.0
             for q in range(n_point):
-                for i in range(3):
-                    for j in range(3):
-                        s = 0.0
-                        for a in range(n_local):
-                            s += ue[i, a] * gradients[e, q, j, a]
-                        F[i, j] = s
+                w = weights[e, q]
+                _gradient(ue, gradients[e, q], F)
                 # E from grad u, not from F'F - I: no cancellation at small strain.
-                energy += weights[e, q] * _stress(F, lam, mu, S)
-                for i in range(3):
-                    for j in range(3):
-                        P[i, j] = (F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]) * weights[e, q]
-                for i in range(3):
-                    for a in range(n_local):
-                        fe[i, a] += (
-                            P[i, 0] * gradients[e, q, 0, a]
-                            + P[i, 1] * gradients[e, q, 1, a]
-                            + P[i, 2] * gradients[e, q, 2, a]
-                        )
+                energy += w * _stress(F, lam, mu, S)
+                _product(F, S, w, P)
+                _add_divergence(P, gradients[e, q], fe)
+                if beta > 0.0:
+                    _gradient(ve, gradients[e, q], D)
+                    _viscous_stress(F, D, beta * lam, beta * mu, Sv)
+                    _product(F, Sv, w, Q)
+                    _add_divergence(Q, gradients[e, q], ge)
             energies[e, c] = energy
             for a in range(n_local):
                 for i in range(3):
                     forces[e, a, i, c] = fe[i, a]
+                    if beta > 0.0:
+                        viscous[e, a, i, c] = ge[i, a]
+
+
+@inlined
+def _gather_cell(u: FloatArray, nodes: IntArray, case: int, ue: FloatArray) -> None:
+    for a in range(len(nodes)):
+        for i in range(3):
+            ue[i, a] = u[3 * nodes[a] + i, case]
+
+
+@inlined
+def _gradient(ue: FloatArray, gradients: FloatArray, out: FloatArray) -> None:
+    """Gradient (3, 3) of the field with nodal values ue (3, n_local)."""
+    for i in range(3):
+        for j in range(3):
+            s = 0.0
+            for a in range(ue.shape[1]):
+                s += ue[i, a] * gradients[j, a]
+            out[i, j] = s
+
+
+@inlined
+def _product(F: FloatArray, S: FloatArray, weight: float, out: FloatArray) -> None:
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = (F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]) * weight
+
+
+@inlined
+def _add_divergence(P: FloatArray, gradients: FloatArray, fe: FloatArray) -> None:
+    for i in range(3):
+        for a in range(fe.shape[1]):
+            fe[i, a] += P[i, 0] * gradients[0, a] + P[i, 1] * gradients[1, a] + P[i, 2] * gradients[2, a]
+
+
+@inlined
+def _viscous_stress(F: FloatArray, D: FloatArray, lam: float, mu: float, S: FloatArray) -> None:
+    """S <- lam tr(E') I + 2 mu E' with E' = (F'D + D'F)/2 and D the gradient of the velocity."""
+    trace = 0.0
+    for i in range(3):
+        for j in range(3):
+            s = 0.0
+            for k in range(3):
+                s += F[k, i] * D[k, j] + D[k, i] * F[k, j]
+            S[i, j] = mu * s
+        trace += S[i, i] / (2.0 * mu)
+    for i in range(3):
+        S[i, i] += lam * trace
 
 
 @inlined
@@ -119,11 +167,13 @@ def element_tangents(
     cells: IntArray,
     lame: FloatArray,
     u: FloatArray,
+    geometric_share: float,
     tangents: FloatArray,
 ) -> None:
     """K_ab = sum_q w [(g_a.S g_b) I + lambda Fg_a (Fg_b)' + mu Fg_b (Fg_a)' + mu (g_a.g_b) F F'], g_a = grad N_a.
 
-    u (n_dof,) m; tangents (n_cell, n_local, n_local, 3, 3) N/m, overwritten; the rest as in ``element_forces``.
+    u (n_dof,) m; ``geometric_share`` 1, or 0 to leave out the first term; tangents (n_cell, n_local, n_local, 3, 3)
+    N/m, overwritten; the rest as in ``element_forces``.
 
     Source: linearisation of Bonet & Wood (9.12) for the SVK elasticity tensor.
     """
@@ -160,7 +210,7 @@ def element_tangents(
                         geometric += gradients[e, q, i, b] * Sg[a, i]
                         product += gradients[e, q, i, a] * gradients[e, q, i, b]
                     for i in range(3):
-                        tangents[e, a, b, i, i] += w * geometric
+                        tangents[e, a, b, i, i] += geometric_share * w * geometric
                         for j in range(3):
                             tangents[e, a, b, i, j] += w * (
                                 lam * Fg[a, i] * Fg[b, j] + mu * Fg[b, i] * Fg[a, j] + mu * product * B[i, j]

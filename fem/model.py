@@ -111,11 +111,23 @@ class Model:
             force, energy = force + f, energy + e
         return force, energy
 
-    def elastic_tangent(self, u: FloatArray) -> sp.csr_matrix:
-        """Tangent of all bodies at u (n_dof,), N/m."""
+    def body_forces(self, u: FloatArray, v: FloatArray, beta: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Elastic force of all bodies, viscous force of the Green-Lagrange ones (n_dof, n_case) N, strain energy J.
+
+        The viscous force of linear bodies is beta times their constant stiffness times v and not part of this.
+        """
+        elastic = SparseProduct(self.stiffness)(u)
+        viscous, energy = np.zeros_like(u), 0.5 * np.einsum("nc,nc->c", u, elastic)
+        for cells in self.nonlinear:
+            f, g, e = cells.forces(u, v, beta)
+            elastic, viscous, energy = elastic + f, viscous + g, energy + e
+        return elastic, viscous, energy
+
+    def elastic_tangent(self, u: FloatArray, *, geometric: bool = True) -> sp.csr_matrix:
+        """Tangent of all bodies at u (n_dof,), N/m; without stress stiffening it is what beta multiplies in damping."""
         tangent = self.stiffness
         for cells in self.nonlinear:
-            tangent = tangent + cells.assemble(cells.element_tangents(np.ascontiguousarray(u)))
+            tangent = tangent + cells.assemble(cells.element_tangents(np.ascontiguousarray(u), geometric=geometric))
         return tangent.tocsr()
 
     def constrain(self, matrix: sp.csr_matrix) -> sp.csr_matrix:

@@ -26,17 +26,23 @@ class ModalBasis:
     shapes : (n_dof, n_mode) kg^-0.5.
     left : (n_dof, n_mode) M Phi.
     stiffness : tangent of the bodies at the equilibrium without contact, N/m.
+    material : the same without stress stiffening: Rayleigh damping is C = alpha M + beta material there.
     """
 
     omega: FloatArray
     shapes: FloatArray
     left: FloatArray
     stiffness: sp.csr_matrix
+    material: sp.csr_matrix
 
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """C = alpha M + beta K with K the tangent of the bodies at the equilibrium (contact adds no viscous damping)."""
+    """Forces alpha M v and stresses S_v = beta C:E' in the bodies; contact adds no viscous damping.
+
+    E' is the rate of the Green-Lagrange strain: a constant C = alpha M + beta K of the rest state would see strain in
+    every rotation and damp a thin panel far too much at large amplitude. At the equilibrium both agree.
+    """
 
     alpha: float
     beta: float
@@ -68,14 +74,16 @@ def solve_modes(model: Model, state: StaticState, count: int, *, solver: str = "
     shapes = shapes[:, order]
     shapes /= np.sqrt(np.einsum("nm,nm->m", shapes, mass @ shapes))
     shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(count)])
-    return ModalBasis(np.sqrt(values[order]), np.ascontiguousarray(shapes), np.asarray(mass @ shapes), elastic)
+    material = model.elastic_tangent(state.u, geometric=False)
+    omega = np.sqrt(values[order])
+    return ModalBasis(omega, np.ascontiguousarray(shapes), np.asarray(mass @ shapes), elastic, material)
 
 
 def rayleigh(modes: ModalBasis, which: tuple[int, int], ratios: tuple[float, float]) -> Rayleigh:
     """alpha and beta that give two modes (numbered from 0) their damping ratios.
 
-    2 zeta_j omega_j = alpha + beta kappa_j with kappa_j = phi_j' K phi_j, which is omega_j^2 less the share of the
-    contact.
+    2 zeta_j omega_j = alpha + beta kappa_j with kappa_j = phi_j' K phi_j and K the material tangent: omega_j^2 less
+    the shares of contact and stress stiffening.
     """
     kappa = modal_stiffness(modes)[list(which)]
     right = 2.0 * np.array(ratios) * modes.omega[list(which)]
@@ -90,7 +98,7 @@ def rayleigh(modes: ModalBasis, which: tuple[int, int], ratios: tuple[float, flo
 
 def modal_stiffness(modes: ModalBasis) -> FloatArray:
     """kappa_j = phi_j' K phi_j of the bodies, (n_mode,) 1/s^2."""
-    return np.asarray(np.einsum("nm,nm->m", modes.shapes, modes.stiffness @ modes.shapes))
+    return np.asarray(np.einsum("nm,nm->m", modes.shapes, modes.material @ modes.shapes))
 
 
 def damping_ratios(modes: ModalBasis, damping: Rayleigh) -> FloatArray:

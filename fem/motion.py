@@ -12,9 +12,10 @@ from fem.contact import ContactState
 class MotionState:
     """All that a restart needs; fields (n_dof, n_case) in SI units, u from the undeformed mesh.
 
-    ``force`` is the internal plus contact force at u; ``inertia_a``, ``damping_a``, ``inertia_v``, ``damping_v`` are M
-    a, C a, M v, C v; ``slip`` (n_point, 2, n_case); ``history`` the last displacements (n_kept, n_dof, n_case), newest
-    first; ``work`` (3, n_case) J: friction, damping and external work so far.
+    ``force`` is the internal plus contact force at u, ``viscous`` the damping force of the Green-Lagrange bodies;
+    ``inertia_a``, ``damping_a``, ``inertia_v``, ``damping_v`` are M a, C a, M v, C v with C the linear part of the
+    damping; ``slip`` (n_point, 2, n_case); ``history`` the last displacements (n_kept, n_dof, n_case), newest first;
+    ``work`` (3, n_case) J: friction, damping and external work so far.
     """
 
     step: int
@@ -22,6 +23,7 @@ class MotionState:
     v: FloatArray
     a: FloatArray
     force: FloatArray
+    viscous: FloatArray
     inertia_a: FloatArray
     damping_a: FloatArray
     inertia_v: FloatArray

@@ -63,6 +63,18 @@ class TransientSettings:
     solver: str = "auto"
 
 
+@dataclass(frozen=True)
+class _Solved:
+    """Acceleration of a converged step and what belongs to it."""
+
+    a: FloatArray
+    force: FloatArray
+    viscous: FloatArray
+    strain: FloatArray
+    contact: ContactState
+    iterations: IntArray
+
+
 class Transient:
     """A model, its equilibrium and damping, ready to march from any motion.
 
@@ -93,20 +105,23 @@ class Transient:
         self._inertia_load = -(model.mass @ model.direction(base_direction))
         self._mask = model.free[:, None].astype(float)
         h, s = settings.time_step, self.scheme
-        damping_matrix = damping.alpha * model.mass + damping.beta * modes.stiffness
-        # Mass and damping act on a_(n+1) through one matrix; so do the linear bodies.
+        self._beta = damping.beta
+        # What is linear in a_(n+1) acts through one matrix: mass, its damping, and the damping of the linear bodies.
+        damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
         linear = (1.0 - s.alpha_m) * model.mass + (1.0 - s.alpha_f) * h * s.gamma * damping_matrix
         self._mass = SparseProduct(model.mass)
         self._damping = SparseProduct(damping_matrix)
         self._linear = SparseProduct(linear)
         contact = model.contact.stick_tangent(equilibrium.contact.status[:, 0])
-        matrix = linear + (1.0 - s.alpha_f) * h * h * s.beta * (modes.stiffness + contact)
+        viscous = damping.beta * (modes.material - model.stiffness)
+        matrix = linear + (1.0 - s.alpha_f) * h * (s.gamma * viscous + h * s.beta * (modes.stiffness + contact))
         self._solver = self._factor(model.constrain(matrix))
         self._gap = SparseProduct(model.contact.operator)
         self._pull = SparseProduct(model.contact.operator.T.tocsr())
         self._correction = self._modal_inertia(modes)
         self._rotation = NodalRotation(model)
-        strain = self._force(equilibrium.u[:, None], equilibrium.contact)[1]
+        rest = equilibrium.u[:, None]
+        strain = self._forces(rest, np.zeros_like(rest), equilibrium.contact)[2]
         stored = model.contact.stored_energy(equilibrium.contact.traction)
         self.rest_energies = np.stack([np.zeros(1), strain, stored])
 
@@ -135,23 +150,24 @@ class Transient:
         if slip is None:
             slip = np.repeat(self.equilibrium.contact.slip, n_case, axis=2)
         contact = self.model.contact.evaluate(self._gap(u), slip)
-        force = self._force(u, contact)[0]
+        force, viscous, _ = self._forces(u, v, contact)
         damping_v = self._damping(v)
-        net = (self._load(0.0, n_case) - force - damping_v) * self._mask
+        net = (self._load(0.0, n_case) - force - viscous - damping_v) * self._mask
         solver = make_solver(self.settings.solver, symmetric=True)
         mass = self.model.constrain(self.model.mass)
         solver.analyse(mass)
         solver.factor(mass)
         a = solver.solve(net)
         products = (self._mass(a), self._damping(a), self._mass(v), damping_v)
-        return MotionState(0, u, v, a, force, *products, contact.slip, u[None].copy(), np.zeros((3, n_case)))
+        return MotionState(0, u, v, a, force, viscous, *products, contact.slip, u[None].copy(), np.zeros((3, n_case)))
 
     def observe(self, state: MotionState) -> StepRecord:
         """The record of a state that no step led to (t = 0)."""
         contact = self.model.contact.evaluate(self._gap(state.u), state.slip)
         n_case = state.u.shape[1]
-        force, strain = self._force(state.u, contact)
-        net = (self._load(state.step * self.settings.time_step, n_case) - force - state.damping_v) * self._mask
+        force, viscous, strain = self._forces(state.u, state.v, contact)
+        load = self._load(state.step * self.settings.time_step, n_case)
+        net = (load - force - viscous - state.damping_v) * self._mask
         return StepRecord(state, contact, self._energies(state, strain, contact), net, np.zeros(n_case, dtype=np.int64))
 
     def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
@@ -179,18 +195,20 @@ class Transient:
         constant = (
             s.alpha_m * (old.inertia_a + self._correct_inertia(old.a))
             + (1.0 - s.alpha_f) * damping_v0
-            + s.alpha_f * old.damping_v
-            + s.alpha_f * (old.force - p_old)
+            + s.alpha_f * (old.damping_v + old.force + old.viscous - p_old)
             - (1.0 - s.alpha_f) * p_new
         )
-        a, force, strain, contact, iterations = self._correct(u0, constant, old, anderson)
+        v0 = old.v + h * (1.0 - s.gamma) * old.a
+        solved = self._correct(u0, v0, constant, old, anderson)
+        a, contact = solved.a, solved.contact
         inertia_a, damping_a = self._mass(a), self._damping(a)
         new = MotionState(
             step=old.step + 1,
             u=u0 + h * h * s.beta * a,
-            v=old.v + h * ((1.0 - s.gamma) * old.a + s.gamma * a),
+            v=v0 + h * s.gamma * a,
             a=a,
-            force=force,
+            force=solved.force,
+            viscous=solved.viscous,
             inertia_a=inertia_a,
             damping_a=damping_a,
             inertia_v=old.inertia_v + h * ((1.0 - s.gamma) * old.inertia_a + s.gamma * inertia_a),
@@ -204,13 +222,13 @@ class Transient:
             history=np.concatenate([new.u[None], old.history[:2]]),
             work=old.work + self._increment(old, new, contact, p_old, p_new),
         )
-        net = (p_new - force - new.damping_v) * self._mask
-        return StepRecord(new, contact, self._energies(new, strain, contact), net, iterations)
+        net = (p_new - solved.force - solved.viscous - new.damping_v) * self._mask
+        return StepRecord(new, contact, self._energies(new, solved.strain, contact), net, solved.iterations)
 
     def _correct(
-        self, u0: FloatArray, constant: FloatArray, old: MotionState, anderson: Anderson
-    ) -> tuple[FloatArray, FloatArray, FloatArray, ContactState, IntArray]:
-        """Anderson-accelerated iteration on r(a) = L a + (1-af) f(u0 + b h^2 a) + constant = 0."""
+        self, u0: FloatArray, v0: FloatArray, constant: FloatArray, old: MotionState, anderson: Anderson
+    ) -> _Solved:
+        """Anderson-accelerated iteration on r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0."""
         h, s = self.settings.time_step, self.scheme
         a = (_extrapolate(old.history, old.v * h) - u0) / (h * h * s.beta)
         iterations = np.zeros(a.shape[1], dtype=np.int64)
@@ -221,14 +239,14 @@ class Transient:
         for _ in range(self.settings.max_iterations):
             u = u0 + h * h * s.beta * a
             contact = self.model.contact.evaluate(self._gap(u), old.slip)
-            force, strain = self._force(u, contact)
+            force, viscous, strain = self._forces(u, v0 + h * s.gamma * a, contact)
             inertia = self._linear(a) + (1.0 - s.alpha_m) * self._correct_inertia(a)
-            residual = (inertia + (1.0 - s.alpha_f) * force + constant) * self._mask
+            residual = (inertia + (1.0 - s.alpha_f) * (force + viscous) + constant) * self._mask
             size = np.sqrt(np.einsum("nc,nc->c", residual, residual)) / self._scale
             history.append(float(size.max()))
             active = ~(size <= self.settings.tolerance)
             if not active.any():
-                return a, force, strain, contact, iterations
+                return _Solved(a, force, viscous, strain, contact, iterations)
             if not history[-1] < DIVERGED:
                 break
             correction = -rotate(w, 1.0, self.precondition(rotate(w, -1.0, residual))) * self._mask
@@ -251,10 +269,11 @@ class Transient:
         left, ratio = self._correction
         return np.asarray(left @ (ratio[:, None] * (left.T @ a)))
 
-    def _force(self, u: FloatArray, contact: ContactState) -> tuple[FloatArray, FloatArray]:
-        force, strain = self.model.elastic_force(u)
+    def _forces(self, u: FloatArray, v: FloatArray, contact: ContactState) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Elastic plus contact force, viscous force of the Green-Lagrange bodies, strain energy."""
+        elastic, viscous, strain = self.model.body_forces(u, v, self._beta)
         weighted = np.repeat(self.model.contact.area, 3)[:, None] * contact.traction
-        return force + self._pull(weighted), strain
+        return elastic + self._pull(weighted), viscous, strain
 
     def _load(self, t: float, n_case: int) -> FloatArray:
         load = np.repeat(self.model.load[:, None], n_case, axis=1)
@@ -275,7 +294,7 @@ class Transient:
         rho = 1 the ledger then closes to the tolerance of the steps.
         """
         af = self.scheme.alpha_f
-        damping = (1.0 - af) * new.damping_v + af * old.damping_v
+        damping = (1.0 - af) * (new.damping_v + new.viscous) + af * (old.damping_v + old.viscous)
         friction = self.model.contact.dissipated(contact.traction, old.slip, contact.slip)
         work = [np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, (1.0 - af) * p_new + af * p_old)]
         return np.stack([friction, *work])

@@ -77,7 +77,8 @@ def _transient(
     model = build(study)
     state = equilibrium(model, preload)
     omega = 2.0 * np.pi * modes.frequency_hz
-    basis = ModalBasis(omega, modes.shapes, modes.left, model.elastic_tangent(state.u))
+    tangents = (model.elastic_tangent(state.u), model.elastic_tangent(state.u, geometric=False))
+    basis = ModalBasis(omega, modes.shapes, modes.left, *tangents)
     etas = _start_coordinates(study, basis)
     count = len(etas[0])
     inertia = [np.linalg.norm(modes.left[:, :count] @ (omega[:count] ** 2 * eta)) for eta in etas]

@@ -44,6 +44,27 @@ def test_tangent_is_the_derivative_of_the_force(element: str) -> None:
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
+def test_viscous_force_is_beta_times_the_material_tangent(element: str) -> None:
+    """S_v = beta C:E' with E' = sym(F' grad v) makes the nodal force beta K_material(u) v at any u, exactly."""
+    model = _CASES[element]
+    u, v = wave(model.points, 0.2), np.random.default_rng(4).standard_normal(model.n_dof)
+    viscous = model.body_forces(u[:, None], v[:, None], 0.3)[1][:, 0]
+    expected = 0.3 * (model.elastic_tangent(u, geometric=False) @ v)
+    np.testing.assert_allclose(viscous, expected, atol=1e-13 * np.abs(expected).max())
+    assert viscous @ v > 0.0
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_rigid_spin_is_not_damped(element: str) -> None:
+    """v = w x (x + u) of a body that is already strained and rotated: E' = 0; roundoff of the largest term."""
+    model = _CASES[element]
+    u = wave(model.points, 0.2)
+    v = np.cross([0.3, -1.2, 0.7], model.points + u.reshape(-1, 3)).ravel()
+    still, moving = (model.body_forces(u[:, None], w[:, None], 1.0)[1] for w in (v, np.abs(v)))
+    assert np.abs(still).max() < 1e-13 * np.abs(moving).max()
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
 def test_tangent_is_symmetric(element: str) -> None:
     model = _CASES[element]
     tangent = model.elastic_tangent(wave(model.points, 0.2))

@@ -43,7 +43,7 @@ def test_rayleigh_gives_the_wanted_ratios_back(strip: Strip) -> None:
     damping = rayleigh(strip.modes, (0, 2), (0.004, 0.01))
     ratios = damping_ratios(strip.modes, damping)
     assert ratios[[0, 2]] == pytest.approx([0.004, 0.01], rel=1e-12)
-    C = damping.alpha * strip.model.mass + damping.beta * strip.modes.stiffness
+    C = damping.alpha * strip.model.mass + damping.beta * strip.modes.material
     modal = strip.modes.shapes.T @ (C @ strip.modes.shapes)
     np.testing.assert_allclose(np.diag(modal), 2.0 * ratios * strip.modes.omega, rtol=1e-9)
     # The interface stores a part of the energy of a mode, so that the bodies hold less than omega^2.

@@ -35,7 +35,8 @@ def released(strip: Strip, transient: Transient) -> MotionState:
 def _newton_step(strip: Strip, transient: Transient, old: MotionState) -> np.ndarray:
     """u of the next step by full Newton with consistent tangents on the equations of Chung & Hulbert."""
     model, s, h = strip.model, transient.scheme, transient.settings.time_step
-    C = strip.damping.alpha * model.mass + strip.damping.beta * strip.modes.stiffness
+    beta = strip.damping.beta
+    C = strip.damping.alpha * model.mass + beta * model.stiffness
     left = strip.modes.left[:, :1]
     r = transient.scheme.frequency_corrected_inertia(float(strip.modes.omega[0]), h)
     M = model.mass.toarray() + r * left @ left.T
@@ -45,7 +46,10 @@ def _newton_step(strip: Strip, transient: Transient, old: MotionState) -> np.nda
         traction = model.contact.evaluate(model.contact.relative(u[:, None]), history).traction
         return (model.elastic_force(u[:, None])[0] + model.contact.force(traction))[:, 0]
 
-    f_old, slip, free = old.force[:, 0], old.slip, model.free
+    def viscous(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.asarray(model.body_forces(u[:, None], v[:, None], beta)[1][:, 0])
+
+    f_old, slip, free = old.force[:, 0] + viscous(u0, v0), old.slip, model.free
     a = a0.copy()
     for _ in range(30):
         u = u0 + h * v0 + h * h * ((0.5 - s.beta) * a0 + s.beta * a)
@@ -53,12 +57,14 @@ def _newton_step(strip: Strip, transient: Transient, old: MotionState) -> np.nda
         residual = (
             M @ ((1.0 - s.alpha_m) * a + s.alpha_m * a0)
             + C @ ((1.0 - s.alpha_f) * v + s.alpha_f * v0)
-            + (1.0 - s.alpha_f) * force(u, slip)
+            + (1.0 - s.alpha_f) * (force(u, slip) + viscous(u, v))
             + s.alpha_f * f_old
             - model.load
         )[free]
         K = model.elastic_tangent(u) + model.contact.tangent(u, slip[:, :, 0])
-        J = (1.0 - s.alpha_m) * M + (1.0 - s.alpha_f) * (h * s.gamma * C + h * h * s.beta * K).toarray()
+        # Without the slope of the viscous force in u, which is of the order of beta times the strain rate.
+        D = C + beta * (model.elastic_tangent(u, geometric=False) - model.stiffness)
+        J = (1.0 - s.alpha_m) * M + (1.0 - s.alpha_f) * (h * s.gamma * D + h * h * s.beta * K).toarray()
         change = np.linalg.solve(J[np.ix_(free, free)], residual)
         a[free] -= change
         if np.linalg.norm(change) < 1e-11 * np.linalg.norm(a):
