@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
 
@@ -46,3 +48,24 @@ class StepRecord:
     energies: FloatArray
     net_force: FloatArray
     iterations: IntArray
+
+
+@dataclass(frozen=True)
+class SolvedStep:
+    """Acceleration of a converged step and what belongs to it."""
+
+    a: FloatArray
+    force: FloatArray
+    viscous: FloatArray
+    strain: FloatArray
+    contact: ContactState
+    iterations: IntArray
+
+
+def extrapolated(history: FloatArray, shift: FloatArray) -> FloatArray:
+    """Next displacement from the parabola through the last ones, newest first; at the start u + h v."""
+    if len(history) == 1:
+        return np.asarray(history[0] + shift)
+    if len(history) == 2:
+        return np.asarray(2.0 * history[0] - history[1])
+    return np.asarray(3.0 * history[0] - 3.0 * history[1] + history[2])

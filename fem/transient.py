@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem.anderson import Anderson
-from fem.arrays import FloatArray, IntArray
+from fem.arrays import FloatArray
 from fem.contact import ContactState
 from fem.corotation import NodalRotation, rotate
 from fem.errors import FemConvergenceError
@@ -26,7 +26,7 @@ from fem.generalized_alpha import Scheme
 from fem.linear_solver import LinearSolver, make_solver
 from fem.model import Model
 from fem.modes import ModalBasis, Rayleigh
-from fem.motion import MotionState, StepRecord
+from fem.motion import MotionState, SolvedStep, StepRecord, extrapolated
 from fem.preload import StaticState
 from fem.sparse_product import SparseProduct
 
@@ -61,18 +61,6 @@ class TransientSettings:
     dispersion_correction: bool = True
     corrected_modes: int = 2
     solver: str = "auto"
-
-
-@dataclass(frozen=True)
-class _Solved:
-    """Acceleration of a converged step and what belongs to it."""
-
-    a: FloatArray
-    force: FloatArray
-    viscous: FloatArray
-    strain: FloatArray
-    contact: ContactState
-    iterations: IntArray
 
 
 class Transient:
@@ -227,10 +215,10 @@ class Transient:
 
     def _correct(
         self, u0: FloatArray, v0: FloatArray, constant: FloatArray, old: MotionState, anderson: Anderson
-    ) -> _Solved:
+    ) -> SolvedStep:
         """Anderson-accelerated iteration on r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0."""
         h, s = self.settings.time_step, self.scheme
-        a = (_extrapolate(old.history, old.v * h) - u0) / (h * h * s.beta)
+        a = (extrapolated(old.history, old.v * h) - u0) / (h * h * s.beta)
         iterations = np.zeros(a.shape[1], dtype=np.int64)
         anderson.forget()
         step = previous = None
@@ -246,7 +234,7 @@ class Transient:
             history.append(float(size.max()))
             active = ~(size <= self.settings.tolerance)
             if not active.any():
-                return _Solved(a, force, viscous, strain, contact, iterations)
+                return SolvedStep(a, force, viscous, strain, contact, iterations)
             if not history[-1] < DIVERGED:
                 break
             correction = -rotate(w, 1.0, self.precondition(rotate(w, -1.0, residual))) * self._mask
@@ -298,12 +286,3 @@ class Transient:
         friction = self.model.contact.dissipated(contact.traction, old.slip, contact.slip)
         work = [np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, (1.0 - af) * p_new + af * p_old)]
         return np.stack([friction, *work])
-
-
-def _extrapolate(history: FloatArray, shift: FloatArray) -> FloatArray:
-    """Next displacement from the parabola through the last ones, newest first; at the start u + h v."""
-    if len(history) == 1:
-        return np.asarray(history[0] + shift)
-    if len(history) == 2:
-        return np.asarray(2.0 * history[0] - history[1])
-    return np.asarray(3.0 * history[0] - 3.0 * history[1] + history[2])

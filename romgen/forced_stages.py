@@ -30,14 +30,14 @@ class Backbones:
 
 def forced_stages(study: Study) -> tuple[Stage, ...]:
     """Return the stages: without levels there is no forced response."""
-    stages = [Stage("backbone", Backbones, ("learn",), (), compute_backbones)]
+    stages = []
     if study.forced_response.levels:
         stages.append(Stage("forced_response", ForcedResponse, ("learn",), ("forced_response",), compute_response))
         if study.forced_validation is not None and study.data is None:
             upstream = ("preload", "modes", "ringdowns", "learn", "forced_response")
             tables = ("ringdowns", "forced_validation")
             stages.append(Stage("forced_validation", ForcedValidation, upstream, tables, validate_forced))
-    return tuple(stages)
+    return (*stages, Stage("backbone", Backbones, ("learn",), (), compute_backbones))
 
 
 def compute_response(context: Context) -> ForcedResponse:

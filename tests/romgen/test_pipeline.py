@@ -91,7 +91,8 @@ def test_second_run_recomputes_nothing(finished: RunResult, lab_study: Path) -> 
 
 
 def test_tables_reach_exactly_the_stages_that_use_them() -> None:
-    stages = {stage.name: stage for stage in stages_of(Study.model_validate(STUDY))}
+    study = Study.model_validate({**STUDY, "forced_validation": {}})
+    stages = {stage.name: stage for stage in stages_of(study)}
     used = {table.split(".")[0] for name, stage in stages.items() if name != "provenance" for table in stage.tables}
     # the report states what [report] and [acceptance] say, through the provenance of the whole study
     assert set(Study.model_fields) - used == {"data", "report", "acceptance"}
@@ -99,8 +100,10 @@ def test_tables_reach_exactly_the_stages_that_use_them() -> None:
         assert set(stage.upstream) <= set(stages)
 
 
-def test_order_of_a_model_study() -> None:
-    names = [stage.name for stage in stages_of(Study.model_validate(STUDY))]
+@pytest.mark.parametrize("checked", [True, False])
+def test_order_of_a_model_study(checked: bool) -> None:
+    study = Study.model_validate({**STUDY, "forced_validation": {}} if checked else STUDY)
+    names = [stage.name for stage in stages_of(study)]
     assert names == [
         "mesh",
         "preload",
@@ -108,6 +111,7 @@ def test_order_of_a_model_study() -> None:
         "ringdowns",
         "learn",
         "forced_response",
+        *(["forced_validation"] if checked else []),
         "backbone",
         "fmu",
         "validation",
