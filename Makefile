@@ -7,7 +7,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint quick bench clean
+.PHONY: run test nightly lint quick bench clean
 
 run: .venv/.installed
 	@$(BIN)/romgen run $(STUDY)
@@ -18,6 +18,12 @@ quick: .venv/.installed
 
 test: lint
 	$(BIN)/pytest
+
+# The long runs too: all platforms, large fuzz, and the quick start judged by its own limits.
+nightly: lint
+	$(BIN)/pytest -m "slow or not slow"
+	$(BIN)/romgen run $(STUDY)
+	$(BIN)/romgen validate $(STUDY)
 
 lint: .venv/.installed-dev
 	$(BIN)/ruff check .

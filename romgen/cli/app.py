@@ -15,6 +15,7 @@ from romgen.cli.info import info
 from romgen.cli.learn import learn
 from romgen.cli.report import report
 from romgen.cli.run import run
+from romgen.cli.sweep import sweep
 from romgen.cli.validate import validate
 
 app = typer.Typer(
@@ -43,7 +44,7 @@ def options(
     """Reduced models of jointed, nonlinear structures, shipped as FMUs."""
 
 
-for command in (run, check, learn, frc, export, validate, report, info, doctor):
+for command in (run, sweep, check, learn, frc, export, validate, report, info, doctor):
     app.command()(command)
 
 
