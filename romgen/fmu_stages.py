@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,11 +13,11 @@ from romgen.fmu.driver import replay
 from romgen.fmu.export import export_fmu
 from romgen.fmu.python_export import export_pythonfmu
 from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo
-from romgen.learn import TrajectoryError
 from romgen.learning_stages import learned, learned_model
 from romgen.metrics import nmte_percent
 from romgen.settings import Study
 from romgen.stage import Context, Stage
+from romgen.trajectory_error import TrajectoryError
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +87,9 @@ def validate(context: Context) -> Validation:
         paths[0], learned_model(context), context.study.fmu, pythonfmu=paths[1] if len(paths) > 1 else None
     )
     context.report(0.5, "replay")
-    return Validation(check, tuple(_replay(context, item, paths[0]) for item in learned(context).validation))
+    # a motion on which the model itself diverges has nothing to replay
+    motions = [item for item in learned(context).validation if math.isfinite(item.nmte_percent)]
+    return Validation(check, tuple(_replay(context, item, paths[0]) for item in motions))
 
 
 def _replay(context: Context, motion: TrajectoryError, unit: Path) -> Replay:

@@ -6,29 +6,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from romgen.arrays import ComplexArray, FloatArray, IntArray
+from romgen.arrays import FloatArray
 from romgen.chart import ReducedTrajectory, SensorChart, modal_chart, sensor_chart
-from romgen.differences import is_uniform
-from romgen.errors import InputError, NumericalError
-from romgen.initial_window import fitted_start
-from romgen.manifold import Manifold, ManifoldFit, nmte_blocks
-from romgen.metrics import nmte_percent
+from romgen.errors import InputError
+from romgen.learning_notes import choice_sentence, learning_notes
+from romgen.manifold import Manifold, ManifoldFit
 from romgen.normal_form import NormalFormFit, fit_normal_form
-from romgen.order_selection import OrderTable, choose_order, simulation_error
+from romgen.order_selection import OrderTable, choose_order
 from romgen.polynomial import PolynomialMap, evaluate, exponents
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
-from romgen.simulate import coordinates, free_motion, initial_state, sensors
 from romgen.trajectory import Trajectory
-from romgen.trajectory_fit import fit_on_trajectories, is_long_enough
+from romgen.trajectory_error import TrajectoryError, snapshot_rows, trajectory_error
+from romgen.trajectory_fit import fit_on_trajectories
 
 # The full field is nearly linear plus quadratic in y; higher terms would cost n_dof numbers each.
 FIELD_ORDER = 3
-# A direct fit within this mean NMTE of the training data needs no refinement on trajectories.
-GOOD_PERCENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -47,31 +42,6 @@ class Loads:
 
 
 @dataclass(frozen=True)
-class TrajectoryError:
-    """One trajectory against the model that starts from its first window.
-
-    Attributes
-    ----------
-    name : of the trajectory.
-    nmte_percent : NMTE in full displacement coordinates where snapshots exist, else of the sensors; inf where the model
-        diverges.
-    sensor_nmte_percent : NMTE of the sensor displacements.
-    static_percent : NMTE of the sensors lifted from the true reduced coordinates: the error of the manifold alone.
-    start : (m,) z of the model at t[0].
-    t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m, predicted is nan from a divergence on.
-    """
-
-    name: str
-    nmte_percent: float
-    sensor_nmte_percent: float
-    static_percent: float
-    start: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
-    t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
-    displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
-    predicted: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
-
-
-@dataclass(frozen=True)
 class Learned:
     """A reduced model, how it was made, and what it gets wrong.
 
@@ -81,9 +51,10 @@ class Learned:
     fit : normal form with resonance table, cost, coefficient deviations.
     chart : chart of sensor data; None with modal coordinates.
     full_field : manifold of all degrees of freedom; None without snapshots.
-    order : of the normal form; orders : how it was chosen, None where it was given.
+    order : of the normal form; orders : how order and method were chosen, or the method alone for a given order.
     training, validation : errors; nothing of the validation trajectories enters the model.
-    notes : what was resampled or left out, how the normal form was fitted, which motions diverge.
+    choice : order and method of the normal form with the errors that decided.
+    notes : what was resampled or left out, which motions diverge.
     """
 
     model: ReducedModel
@@ -91,9 +62,10 @@ class Learned:
     chart: SensorChart | None
     full_field: Manifold | None
     order: int
-    orders: OrderTable | None
+    orders: OrderTable
     training: tuple[TrajectoryError, ...]
     validation: tuple[TrajectoryError, ...]
+    choice: str
     notes: tuple[str, ...]
 
 
@@ -125,37 +97,31 @@ def learn(
     m = len(settings.master_modes)
     chart = None if _is_modal(training) else learn_sensor_chart(training, m)
     reduced = [reduced_trajectory(trajectory, chart, settings) for trajectory in training]
-    orders = choose_order(reduced, settings) if settings.order == "auto" else None
-    order = orders.order if orders is not None else int(settings.order)
-    fit = best_fit(reduced, order, settings)
+    orders = choose_order(reduced, settings)
+    fit = best_fit(reduced, orders, settings)
     model = assemble(name, fit, reduced, settings, training[0].sensors, loads)
     full = _full_field(training, reduced, model, settings)
     held_out = [reduced_trajectory(trajectory, chart, settings) for trajectory in validation]
+    pairs = zip([*reduced, *held_out], [*training, *validation], strict=True)
+    errors = tuple(trajectory_error(model, r, trajectory, full) for r, trajectory in pairs)
     return Learned(
         model=model,
         fit=fit,
         chart=chart,
         full_field=full,
-        order=order,
+        order=orders.order,
         orders=orders,
-        training=tuple(trajectory_error(model, r, x, full) for r, x in zip(reduced, training, strict=True)),
-        validation=tuple(trajectory_error(model, r, x, full) for r, x in zip(held_out, validation, strict=True)),
-        notes=_notes([*training, *validation], chart),
+        training=errors[: len(training)],
+        validation=errors[len(training) :],
+        choice=choice_sentence(orders),
+        notes=learning_notes([*training, *validation], chart, model, errors),
     )
 
 
-def best_fit(training: Sequence[ReducedTrajectory], order: int, settings: LearnSettings) -> NormalFormFit:
-    """Return the normal form, from conjugacy or from whole trajectories, that simulates the training data better.
-
-    The conjugacy fit is exact for smooth data; friction and noise favour the fit on trajectories, which is tried where
-    the data are long enough and the conjugacy fit misses them by more than GOOD_PERCENT.
-    """
-    direct = fit_normal_form(training, order, settings.internal_resonance, settings.ridge)
-    error = simulation_error(direct, training)
-    if error < GOOD_PERCENT or not is_long_enough(training, direct.dynamics.eigenvalues):
-        return direct
-    on_trajectories = fit_on_trajectories(training, order, settings.internal_resonance, settings.ridge)
-    return on_trajectories if simulation_error(on_trajectories, training) < error else direct
+def best_fit(training: Sequence[ReducedTrajectory], table: OrderTable, settings: LearnSettings) -> NormalFormFit:
+    """Return the normal form of all training data by the order and method of the table."""
+    method = fit_normal_form if table.method == "conjugacy" else fit_on_trajectories
+    return method(training, table.order, settings.internal_resonance, settings.ridge)
 
 
 def reduced_trajectory(trajectory: Trajectory, chart: SensorChart | None, settings: LearnSettings) -> ReducedTrajectory:
@@ -211,40 +177,6 @@ def assemble(
     )
 
 
-def trajectory_error(
-    model: ReducedModel, r: ReducedTrajectory, trajectory: Trajectory, full: Manifold | None
-) -> TrajectoryError:
-    """Simulate from the first window of a trajectory and compare with all of it."""
-    z0, z = _from_first_window(model, r)
-    finite = np.isfinite(z).all()
-    predicted = sensors(model, z)[0]
-    sensor_error = nmte_percent(r.displacement, predicted) if finite else float("inf")
-    error = sensor_error
-    if finite and full is not None and trajectory.snapshots is not None and trajectory.snapshot_index is not None:
-        rows, snapshots = _snapshot_rows(trajectory, r)
-        error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
-    static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
-    return TrajectoryError(r.name, error, sensor_error, static, z0, r.t, r.displacement, predicted)
-
-
-def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, ComplexArray]:
-    """Return the start and the motion of the model, nan from a divergence on."""
-    try:
-        z0 = fitted_start(model, r)
-    except NumericalError:
-        z0 = initial_state(model, r.y[0])
-    return z0, free_motion(model, r.t, z0)
-
-
-def _snapshot_rows(trajectory: Trajectory, r: ReducedTrajectory) -> tuple[IntArray, npt.NDArray[np.float32]]:
-    """Return the rows of r of the snapshots that start_time left, and these snapshots."""
-    assert trajectory.snapshots is not None
-    assert trajectory.snapshot_index is not None
-    first = len(trajectory.t) - len(r.t)
-    keep = trajectory.snapshot_index >= first
-    return trajectory.snapshot_index[keep] - first, trajectory.snapshots[keep]
-
-
 def _full_field(
     training: Sequence[Trajectory], reduced: Sequence[ReducedTrajectory], model: ReducedModel, settings: LearnSettings
 ) -> Manifold | None:
@@ -253,7 +185,7 @@ def _full_field(
     order = settings.geometry_order or FIELD_ORDER
     fit: ManifoldFit | None = None
     for trajectory, r in zip(training, reduced, strict=True):
-        rows, snapshots = _snapshot_rows(trajectory, r)
+        rows, snapshots = snapshot_rows(trajectory, r)
         if fit is None:
             fit = ManifoldFit(snapshots.shape[1], exponents(r.y.shape[1], 1, order), model.scale)
         fit.add(snapshots, r.y[rows])
@@ -279,16 +211,3 @@ def _check(training: Sequence[Trajectory], validation: Sequence[Trajectory], loa
             raise InputError("other sensors", where=f"trajectory '{trajectory.name}'", value=trajectory.sensors)
     if loads is not None and not _is_modal(training):
         raise InputError("modal loads need trajectories with modal fields", where="learn", value=loads.inputs)
-
-
-def _notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) -> tuple[str, ...]:
-    if chart is None:
-        return ()
-    notes = [
-        f"trajectory '{trajectory.name}' was resampled to a step of {chart.step:.6g} s"
-        for trajectory in trajectories
-        if not is_uniform(trajectory.t, chart.step)
-    ]
-    if chart.delays > 1:
-        notes.append(f"too few sensors for {len(chart.frequency_hz)} modes: {chart.delays} delays were used")
-    return tuple(notes)

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterable
 from typing import Any
 
-from romgen.learn import Learned, Loads, TrajectoryError, learn
+from romgen.learn import Learned, Loads, learn
 from romgen.model_stages import recorded
 from romgen.reduced_model import ReducedModel
 from romgen.report.inputs import Reconstruction, Role
@@ -14,6 +14,7 @@ from romgen.settings import Study
 from romgen.stage import Context, Stage
 from romgen.structure import Modes
 from romgen.trajectory import Trajectory
+from romgen.trajectory_error import TrajectoryError
 
 log = logging.getLogger(__name__)
 
@@ -28,6 +29,7 @@ def learn_model(context: Context) -> Learned:
     """Learn from the training trajectories; judge by the validation ones."""
     study, trajectories = context.study, recorded(context)
     learned = learn(trajectories.training, trajectories.validation, study.learn, study.name, _loads(context))
+    log.info("%s", learned.choice)
     for note in learned.notes:
         log.warning("%s", note)
     return learned

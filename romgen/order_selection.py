@@ -1,13 +1,14 @@
-"""The order of the normal form by cross-validation over blocks of the training trajectories."""
+"""Order and method of the normal form by cross-validation over blocks of the training trajectories."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from romgen.arrays import FloatArray, IntArray
+from romgen.arrays import BoolArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory
 from romgen.errors import NumericalError
 from romgen.initial_window import fitted_start
@@ -18,6 +19,7 @@ from romgen.reduced_dynamics import modal_samples
 from romgen.reduced_model import ReducedModel
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate
+from romgen.trajectory_fit import START_ORDER, growing_fits, is_long_enough, masked
 
 CANDIDATES = (3, 5, 7)
 # Alternate blocks train and test; eight per trajectory leave several beats of two modes in each.
@@ -26,84 +28,165 @@ BLOCKS, FOLDS = 8, 2
 IMPROVEMENT = 0.9
 # A block that diverges, or misses by more, counts with this NMTE in percent: the motion was not predicted at all.
 LOST_PERCENT = 100.0
+# Conjugacy fits that predict held-out blocks within this NMTE in percent need no (far slower) fit on trajectories.
+GOOD_PERCENT = 1.0
+# Fits on trajectories, for comparison only: few steps show what an order can do, and order 7 would take minutes.
+TRAJECTORY_CANDIDATES, FEW_STEPS = (3, 5), 8
+
+Method = Literal["conjugacy", "trajectories"]
 
 
 @dataclass(frozen=True)
 class OrderTable:
-    """Cross-validated error of each order tried.
+    """Cross-validated error of each order and method tried.
 
     Held-out blocks whose modal amplitudes exceed those of the blocks fitted are not scored: a polynomial promises
     nothing there. So the first block of a decay, its largest amplitudes, usually only trains.
 
     Attributes
     ----------
-    order : the lowest order that the next one does not improve by a tenth.
-    tried : (n_tried,) orders.
-    nmte_percent : (n_tried,) mean NMTE of reduced coordinates on held-out blocks within the amplitudes of the fit;
-        a block that diverges counts 100 %; inf where a fit failed.
+    order : of the best; within a method a higher order counts only where it is better by a tenth.
+    method : of the best: "conjugacy", the instantaneous rates, or "trajectories", whole motions.
+    tried : (n_tried,) orders; methods : the method of each.
+    nmte_percent : (n_tried,) mean NMTE of reduced coordinates on held-out blocks within the amplitudes of the fit,
+        relative to the largest norm of their whole trajectory; a block that diverges counts 100 %; inf where a fit
+        failed.
     scored, lost : (n_tried,) number of blocks in the mean, and how many of them counted 100 %.
     """
 
     order: int
+    method: Method
     tried: IntArray = field(metadata={"unit": "1", "axes": "order"})
+    methods: tuple[str, ...]
     nmte_percent: FloatArray = field(metadata={"unit": "%", "axes": "order"})
     scored: IntArray = field(metadata={"unit": "1", "axes": "order"})
     lost: IntArray = field(metadata={"unit": "1", "axes": "order"})
 
 
+@dataclass(frozen=True)
+class _Trial:
+    order: int
+    method: Method
+    errors: FloatArray
+
+    @property
+    def mean(self) -> float:
+        """Mean over blocks in percent."""
+        return float(self.errors.mean()) if self.errors.size else float("inf")
+
+
 def choose_order(training: Sequence[ReducedTrajectory], settings: LearnSettings) -> OrderTable:
-    """Return the order by two-fold cross-validation over alternating blocks of time, training data only.
+    """Return order and method by two-fold cross-validation over alternating blocks of time, training data only.
+
+    A given order leaves the method to choose. Fits on trajectories are tried where the conjugacy fit misses held-out
+    blocks by more than GOOD_PERCENT and the data are uniform and long enough.
 
     Raises
     ------
     NumericalError : no order can be fitted, or all lose every block.
     """
-    tried: list[int] = []
-    errors: list[FloatArray] = []
-    means: list[float] = []
-    best = -1
-    for order in CANDIDATES:
-        tried.append(order)
-        errors.append(held_out_errors(training, order, settings))
-        means.append(float(errors[-1].mean()) if errors[-1].size else float("inf"))
-        if best >= 0 and not means[-1] < IMPROVEMENT * means[best]:
-            break
-        if means[-1] < LOST_PERCENT:
-            best = len(tried) - 1
-    if best < 0:
+    orders = CANDIDATES if settings.order == "auto" else (int(settings.order),)
+    trials, best = _improving(_conjugacy_trials(training, orders, settings))
+    if best.mean > GOOD_PERCENT and is_long_enough(training):
+        possible = TRAJECTORY_CANDIDATES if settings.order == "auto" else orders
+        more, other = _improving(_trajectory_trials(training, possible, settings))
+        trials += more
+        best = min(best, other, key=lambda trial: trial.mean)
+    if not best.mean < LOST_PERCENT:
         raise NumericalError(
-            "no order gives a stable model", where="learn order", value=tried, advice="give longer or cleaner decays"
+            "no order gives a stable model", where="learn order", value=orders, advice="give longer or cleaner decays"
         )
-    scored = np.array([e.size for e in errors])
-    lost = np.array([int((e >= LOST_PERCENT).sum()) for e in errors])
-    return OrderTable(tried[best], np.array(tried), np.array(means), scored, lost)
+    return OrderTable(
+        order=best.order,
+        method=best.method,
+        tried=np.array([trial.order for trial in trials]),
+        methods=tuple(trial.method for trial in trials),
+        nmte_percent=np.array([trial.mean for trial in trials]),
+        scored=np.array([trial.errors.size for trial in trials]),
+        lost=np.array([int((trial.errors >= LOST_PERCENT).sum()) for trial in trials]),
+    )
 
 
-def held_out_errors(training: Sequence[ReducedTrajectory], order: int, settings: LearnSettings) -> FloatArray:
-    """Return the NMTE in percent, at most 100, of each held-out block in range; none where a fit fails."""
-    errors: list[float] = []
-    for fold in range(FOLDS):
-        held_out = [block for r in training for block in _blocks(r)[fold::FOLDS]]
-        rest = [block for r in training for k, block in enumerate(_blocks(r)) if k % FOLDS != fold]
+def _improving(trials: Iterator[_Trial]) -> tuple[list[_Trial], _Trial]:
+    """Return the trials up to the first that does not improve enough, and the best of them."""
+    tried = [next(trials)]
+    best = tried[0]
+    for trial in trials:
+        tried.append(trial)
+        if not trial.mean < IMPROVEMENT * best.mean and np.isfinite(best.mean):
+            break
+        best = trial
+    return tried, best
+
+
+def _conjugacy_trials(
+    training: Sequence[ReducedTrajectory], orders: Sequence[int], settings: LearnSettings
+) -> Iterator[_Trial]:
+    for order in orders:
+        errors: list[float] = []
+        for kept in _folds(training):
+            seen = [block for r, keep in zip(training, kept, strict=True) for block in _runs(r, keep)]
+            try:
+                fit = fit_normal_form(seen, order, settings.internal_resonance, settings.ridge)
+            except NumericalError:
+                errors = []
+                break
+            errors += _held_out_errors(fit, training, kept)
+        yield _Trial(order, "conjugacy", np.array(errors))
+
+
+def _trajectory_trials(
+    training: Sequence[ReducedTrajectory], orders: Sequence[int], settings: LearnSettings
+) -> Iterator[_Trial]:
+    folds = _folds(training)
+    steps = sorted({*range(START_ORDER, orders[0], 2), *orders})
+    given = (settings.internal_resonance, settings.ridge)
+    fits = [growing_fits(training, kept, steps, given, FEW_STEPS) for kept in folds]
+    for order in steps:
         try:
-            fit = fit_normal_form(rest, order, settings.internal_resonance, settings.ridge)
+            grown = [next(fit) for fit in fits]
         except NumericalError:
-            return np.zeros(0)
-        largest = np.max([modal_amplitudes(fit, block) for block in rest], axis=0)
-        inside = [block for block in held_out if np.all(modal_amplitudes(fit, block) <= largest)]
-        errors += [min(motion_error(fit, block), LOST_PERCENT) for block in inside]
-    return np.array(errors)
+            yield _Trial(order, "trajectories", np.zeros(0))
+            return
+        if order in orders:
+            errors = [
+                error for fit, kept in zip(grown, folds, strict=True) for error in _held_out_errors(fit, training, kept)
+            ]
+            yield _Trial(order, "trajectories", np.array(errors))
+
+
+def _held_out_errors(
+    fit: NormalFormFit, training: Sequence[ReducedTrajectory], kept: Sequence[BoolArray]
+) -> list[float]:
+    """Return the NMTE in percent, at most 100, of each held-out block within the amplitudes of the kept samples."""
+    pairs = list(zip(training, kept, strict=True))
+    largest = np.max([modal_amplitudes(fit, masked(r, keep)) for r, keep in pairs], axis=0)
+    errors = []
+    for r, keep in pairs:
+        norms = np.linalg.norm(r.y / fit.dynamics.scale, axis=1)
+        for block in _runs(r, ~keep):
+            if np.all(modal_amplitudes(fit, block) <= largest):
+                own = np.linalg.norm(block.y / fit.dynamics.scale, axis=1).max()
+                errors.append(min(motion_error(fit, block) * own / norms.max(), LOST_PERCENT))
+    return errors
+
+
+def _folds(training: Sequence[ReducedTrajectory]) -> list[list[BoolArray]]:
+    """Return per fold and trajectory the samples that train, (n_time,)."""
+    blocks = [np.arange(len(r.t)) * BLOCKS // len(r.t) for r in training]
+    return [[block % FOLDS != fold for block in blocks] for fold in range(FOLDS)]
+
+
+def _runs(r: ReducedTrajectory, keep: BoolArray) -> list[ReducedTrajectory]:
+    """Return the blocks of a trajectory where ``keep`` is True."""
+    block = np.arange(len(r.t)) * BLOCKS // len(r.t)
+    return [masked(r, block == k) for k in range(BLOCKS) if keep[np.argmax(block == k)]]
 
 
 def modal_amplitudes(fit: NormalFormFit, r: ReducedTrajectory) -> FloatArray:
     """Return the largest abs(q_j) of a motion, (m,), q the modal coordinates of the linear part."""
     largest: FloatArray = np.abs(modal_samples(fit.dynamics, r)[0]).max(axis=0)
     return largest
-
-
-def simulation_error(fit: NormalFormFit, motions: Sequence[ReducedTrajectory]) -> float:
-    """Return the mean NMTE in percent of y / s over motions; inf where one diverges."""
-    return float(np.mean([motion_error(fit, motion) for motion in motions]))
 
 
 def motion_error(fit: NormalFormFit, r: ReducedTrajectory) -> float:
@@ -137,10 +220,3 @@ def autonomous_model(fit: NormalFormFit) -> ReducedModel:
         internal_resonance=fit.resonance.internal_resonance,
         trained_amplitude=np.full(m, 0.5),
     )
-
-
-def _blocks(r: ReducedTrajectory) -> list[ReducedTrajectory]:
-    return [
-        ReducedTrajectory(r.name, r.t[k], r.y[k], r.y_dot[k], r.displacement[k], r.velocity[k])
-        for k in np.array_split(np.arange(len(r.t)), BLOCKS)
-    ]

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from romgen.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from romgen.etdrk4 import march
 from romgen.polynomial import monomial_gradient, monomials, zeta
 from romgen.regression import ridge_fit
 from romgen.variational import sensitivities
@@ -24,6 +25,8 @@ from romgen.variational import sensitivities
 PRIOR_REAL, PRIOR_IMAG, PRIOR_ERROR = 0.1, 0.005, 0.02
 MAX_REJECTIONS = 12
 DECREASE = 1e-5
+# Modal amplitudes of the data are at most 1/2; a trial that gets this far has blown up.
+FAR = 1e3
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,13 @@ class Segment:
     t : (n_time,) s.
     q : (n_time, m) modal coordinates of the data.
     z0 : (m,) initial state of the model.
+    kept : (n_time,) samples that count; the others are held out.
     """
 
     t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
     q: ComplexArray = field(metadata={"unit": "1", "axes": "time,mode"})
     z0: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
+    kept: BoolArray = field(metadata={"unit": "1", "axes": "time"})
 
 
 @dataclass(frozen=True)
@@ -129,9 +134,9 @@ def grown(model: RefinedDynamics, exponents: IntArray, resonant: BoolArray) -> R
 
 
 def _parameters(model: RefinedDynamics) -> tuple[IntArray, IntArray]:
-    """Row and term of each unknown: eigenvalue corrections (linear terms come first in the table), then B."""
+    """Row and term of each unknown in the table of ``_simulate``: eigenvalue corrections, then B."""
     m = len(model.eigenvalues)
-    rows, terms = np.nonzero(model.resonant)
+    rows, terms = np.nonzero(model.resonant[:, model.resonant.any(axis=0)])
     return np.concatenate([np.arange(m), rows]), np.concatenate([np.arange(m), m + terms])
 
 
@@ -194,10 +199,19 @@ def _linearise(
 def _simulate(
     model: RefinedDynamics, segments: tuple[Segment, ...], parameters: tuple[IntArray, IntArray], max_step: float
 ) -> list[tuple[ComplexArray, ComplexArray]]:
+    """Integrate the segments over the linear terms, to be corrected, and the resonant terms; all others are 0."""
     m = len(model.eigenvalues)
-    linear = np.eye(2 * m, dtype=np.int64)[:m]
-    table = (np.vstack([linear, model.exponents]), np.hstack([np.zeros((m, m)), model.B]))
+    linear, kept = np.eye(2 * m, dtype=np.int64)[:m], model.resonant.any(axis=0)
+    table = (np.vstack([linear, model.exponents[kept]]), np.hstack([np.zeros((m, m)), model.B[:, kept]]))
     return [sensitivities(s.t, s.z0, model.eigenvalues, table, parameters, max_step) for s in segments]
+
+
+def _free(
+    segment: Segment, eigenvalues: ComplexArray, normal_form: tuple[IntArray, ComplexArray], max_step: float
+) -> ComplexArray:
+    """Return z (n_time, m) of a segment without sensitivities."""
+    still = np.zeros((len(segment.t) - 1, len(eigenvalues)), dtype=np.complex128)
+    return march(segment.t, segment.z0, eigenvalues, *normal_form, still, still, max_step)
 
 
 def _projected_output(
@@ -213,7 +227,7 @@ def _projected_output(
 
 def _shares(segments: tuple[Segment, ...]) -> FloatArray:
     """Return the weight of each sample, (n_sample, 1): one over the largest abs(q) of its segment, as in the NMTE."""
-    weights = [np.full((len(s.t), 1), 1.0 / np.linalg.norm(s.q, axis=1).max()) for s in segments]
+    weights = [s.kept[:, None] / np.linalg.norm(s.q[s.kept], axis=1).max() for s in segments]
     return np.vstack(weights)
 
 
@@ -222,9 +236,9 @@ def _cost(
 ) -> float:
     """Return the cost without derivatives; inf where a segment blows up or a mode does not decay."""
     ridge, max_step = settings
-    none = np.zeros(0, dtype=np.int64)
-    z = np.vstack([run[0] for run in _simulate(model, segments, (none, none), max_step)])
-    if not np.isfinite(z).all() or np.any(model.eigenvalues.real >= 0):
+    E, B = model.exponents[model.resonant.any(axis=0)], model.B[:, model.resonant.any(axis=0)]
+    z = np.vstack([_free(s, model.eigenvalues, (E, B), max_step) for s in segments])
+    if not np.abs(z).max() < FAR or np.any(model.eigenvalues.real >= 0):
         return float("inf")
     q = np.vstack([s.q for s in segments])
     share = _shares(segments)

@@ -83,10 +83,9 @@ def report_inputs(context: Context) -> ReportInputs:
 def _orders(record: Learned) -> tuple[OrderTrial, ...]:
     """The orders that cross-validation over the training motions tried."""
     table = record.orders
-    if table is None:
-        return ()
-    trials = zip(table.tried.tolist(), table.nmte_percent.tolist(), strict=True)
-    return tuple(OrderTrial(order, error, order == record.order) for order, error in trials)
+    trials = zip(table.tried.tolist(), table.methods, table.nmte_percent.tolist(), strict=True)
+    best = (table.order, table.method)
+    return tuple(OrderTrial(order, error, (order, method) == best) for order, method, error in trials)
 
 
 def _optional(context: Context, stage: str, cls: type[Record]) -> Record | None:

@@ -1,0 +1,67 @@
+"""What a user should know about how a model was learned, one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from romgen.arrays import ComplexArray, FloatArray
+from romgen.chart import SensorChart
+from romgen.differences import is_uniform
+from romgen.order_selection import OrderTable
+from romgen.reduced_model import ReducedModel
+from romgen.trajectory import Trajectory
+from romgen.trajectory_error import TrajectoryError
+
+
+def learning_notes(
+    trajectories: Sequence[Trajectory],
+    chart: SensorChart | None,
+    model: ReducedModel,
+    errors: Sequence[TrajectoryError],
+) -> tuple[str, ...]:
+    """Return what was resampled and which motions diverge.
+
+    Parameters
+    ----------
+    trajectories : all, training first.
+    chart : None with modal coordinates.
+    errors : of the model on all trajectories.
+    """
+    return (*_chart_notes(trajectories, chart), *_divergences(model, errors))
+
+
+def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) -> Iterator[str]:
+    if chart is None:
+        return
+    for trajectory in trajectories:
+        if not is_uniform(trajectory.t, chart.step):
+            yield f"trajectory '{trajectory.name}' was resampled to a step of {chart.step:.6g} s"
+    if chart.delays > 1:
+        yield f"too few sensors for {len(chart.frequency_hz)} modes: {chart.delays} delays were used"
+
+
+def choice_sentence(orders: OrderTable) -> str:
+    """Return order and method of the normal form with the errors that decided."""
+    rows = zip(orders.tried, orders.methods, orders.nmte_percent, strict=True)
+    tried = ", ".join(f"order {order} on {method} {error:.3g} %" for order, method, error in rows)
+    return (
+        f"normal form of order {orders.order} fitted on {orders.method}: "
+        f"mean NMTE of held-out blocks of the training data was {tried}"
+    )
+
+
+def _divergences(model: ReducedModel, errors: Sequence[TrajectoryError]) -> Iterator[str]:
+    for error in errors:
+        if not np.isfinite(error.nmte_percent):
+            lost = error.t[int(np.isnan(error.predicted).any(axis=1).argmax())]
+            yield (
+                f"the model diverges on '{error.name}' at t = {lost:.4g} s: it starts at abs(z) = "
+                f"{_numbers(error.start)}, trained were {_numbers(model.trained_amplitude)}; "
+                "train on motions that reach these amplitudes, or lower [learn] order"
+            )
+
+
+def _numbers(z: ComplexArray | FloatArray) -> str:
+    return "(" + ", ".join(f"{abs(value):.3g}" for value in z) + ")"

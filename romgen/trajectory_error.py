@@ -1,0 +1,78 @@
+"""How far a reduced model is from a recorded motion, started from the first window of that motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from romgen.arrays import ComplexArray, FloatArray, IntArray
+from romgen.chart import ReducedTrajectory
+from romgen.errors import NumericalError
+from romgen.initial_window import fitted_start
+from romgen.manifold import Manifold, nmte_blocks
+from romgen.metrics import nmte_percent
+from romgen.polynomial import evaluate
+from romgen.reduced_model import ReducedModel
+from romgen.simulate import coordinates, free_motion, initial_state, sensors
+from romgen.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class TrajectoryError:
+    """One trajectory against the model that starts from its first window.
+
+    Attributes
+    ----------
+    name : of the trajectory.
+    nmte_percent : NMTE in full displacement coordinates where snapshots exist, else of the sensors; inf where the model
+        diverges.
+    sensor_nmte_percent : NMTE of the sensor displacements.
+    static_percent : NMTE of the sensors lifted from the true reduced coordinates: the error of the manifold alone.
+    start : (m,) z of the model at t[0].
+    t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m, predicted is nan from a divergence on.
+    """
+
+    name: str
+    nmte_percent: float
+    sensor_nmte_percent: float
+    static_percent: float
+    start: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
+    t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
+    displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
+    predicted: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
+
+
+def trajectory_error(
+    model: ReducedModel, r: ReducedTrajectory, trajectory: Trajectory, full: Manifold | None
+) -> TrajectoryError:
+    """Simulate from the first window of a trajectory and compare with all of it."""
+    z0, z = _from_first_window(model, r)
+    finite = np.isfinite(z).all()
+    predicted = sensors(model, z)[0]
+    sensor_error = nmte_percent(r.displacement, predicted) if finite else float("inf")
+    error = sensor_error
+    if finite and full is not None and trajectory.snapshots is not None and trajectory.snapshot_index is not None:
+        rows, snapshots = snapshot_rows(trajectory, r)
+        error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
+    static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
+    return TrajectoryError(r.name, error, sensor_error, static, z0, r.t, r.displacement, predicted)
+
+
+def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, ComplexArray]:
+    """Return the start and the motion of the model, nan from a divergence on."""
+    try:
+        z0 = fitted_start(model, r)
+    except NumericalError:
+        z0 = initial_state(model, r.y[0])
+    return z0, free_motion(model, r.t, z0)
+
+
+def snapshot_rows(trajectory: Trajectory, r: ReducedTrajectory) -> tuple[IntArray, npt.NDArray[np.float32]]:
+    """Return the rows of r of the snapshots that start_time left, and these snapshots."""
+    assert trajectory.snapshots is not None
+    assert trajectory.snapshot_index is not None
+    first = len(trajectory.t) - len(r.t)
+    keep = trajectory.snapshot_index >= first
+    return trajectory.snapshot_index[keep] - first, trajectory.snapshots[keep]
