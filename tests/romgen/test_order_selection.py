@@ -1,0 +1,76 @@
+"""Choice of order and method: only blocks within the fitted amplitudes count, a lost block costs 100 %."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from romgen.arrays import FloatArray
+from romgen.chart import ReducedTrajectory
+from romgen.learn import learn
+from romgen.learning_notes import learning_notes
+from romgen.order_selection import choose_order
+from romgen.polynomial import PolynomialMap
+from romgen.settings import LearnSettings
+from romgen.trajectory import Trajectory
+from romgen.trajectory_error import trajectory_error
+
+RATE = 1000.0
+SETTINGS = LearnSettings(master_modes=(1,), internal_resonance=(), order="auto")
+
+
+def decay(name: str, amplitude: float, cubic: float, quintic: float) -> Trajectory:
+    """x'' + 0.06 x' + x + cubic x^3 + quintic x^5 = 0 from rest at ``amplitude``, in units of 1/RATE seconds."""
+
+    def acceleration(x: FloatArray, v: FloatArray) -> FloatArray:
+        return -0.06 * v - x - cubic * x**3 - quintic * x**5
+
+    t = np.linspace(0.0, 60.0, 1201)
+    out = solve_ivp(lambda _, s: [s[1], acceleration(s[0], s[1])], (0, 60), [amplitude, 0.0], "DOP853", t, rtol=1e-10)
+    x, v = out.y
+    velocity, second = RATE * v[:, None], RATE**2 * acceleration(x, v)[:, None]
+    return Trajectory(name, t / RATE, ("a",), x[:, None], velocity, x[:, None], velocity, second)
+
+
+def reduced(motion: Trajectory) -> ReducedTrajectory:
+    assert motion.velocity is not None
+    assert motion.eta_ddot is not None
+    y = np.hstack([motion.displacement, motion.velocity])
+    return ReducedTrajectory(
+        motion.name, motion.t, y, np.hstack([motion.velocity, motion.eta_ddot]), motion.displacement, motion.velocity
+    )
+
+
+def test_a_strong_quintic_needs_order_five() -> None:
+    table = choose_order([reduced(decay("one", 1.0, 0.2, 0.3))], SETTINGS)
+    assert table.order >= 5
+    assert table.tried[0] == 3
+    assert table.nmte_percent[1] < table.nmte_percent[0]
+    # eight blocks in two folds, of which the first, the largest amplitudes, only trains
+    assert table.scored.max() == 7
+    assert table.lost.max() == 0
+
+
+def test_a_given_order_is_kept() -> None:
+    settings = SETTINGS.model_copy(update={"order": 3})
+    table = choose_order([reduced(decay("one", 1.0, 0.2, 0.0))], settings)
+    assert table.order == 3
+    assert set(table.tried.tolist()) == {3}
+
+
+def test_divergence_is_reported_and_not_raised() -> None:
+    motion = decay("fast", 0.5, 0.2, 0.0)
+    learned = learn([motion], [], SETTINGS.model_copy(update={"order": 3}), "cubic")
+    model, E = learned.model, learned.model.normal_form.exponents
+    # z' = .. + 4e4 z abs(z)^2 1/s: grows without bound above abs(z) = sqrt(30 / 4e4), far below the start
+    growth = 4e4 * (E == [2, 1]).all(axis=1).astype(complex)[None]
+    error = trajectory_error(replace(model, normal_form=PolynomialMap(E, growth)), reduced(motion), motion, None)
+    assert error.nmte_percent == float("inf")
+    assert np.isnan(error.predicted[-1]).all()
+    notes = learning_notes([motion], None, model, [error])
+    assert len(notes) == 1
+    assert "diverges on 'fast'" in notes[0]
+    assert "trained were" in notes[0]
+    assert learning_notes([motion], None, model, learned.training) == ()
