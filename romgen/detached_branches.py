@@ -16,6 +16,7 @@ from romgen.forced_curve import ForcedSystem
 
 # Two solutions are the same where they differ by less than this share of the state scale.
 SAME = 1e-5
+ROUNDING = 1e-9
 MOST_BRANCHES = 8
 SEARCH_ITERATIONS = 15
 
@@ -84,8 +85,11 @@ def random_starts(
 def _holds(system: ForcedSystem, branch: Branch, x: FloatArray, omega: float, settings: ContinuationSettings) -> bool:
     """Tell whether a branch passes through x, or through its image under a shift by whole forcing periods."""
     tolerance = SAME * settings.state_scale
+    # The end of a branch may miss the end of the range by rounding.
+    inside = float(np.clip(omega, branch.p.min(), branch.p.max()))
+    bracketed = inside if abs(inside - omega) <= ROUNDING * omega else omega
     for i, j in pairwise(range(branch.p.size)):
-        a, b = branch.p[i] - omega, branch.p[j] - omega
+        a, b = branch.p[i] - bracketed, branch.p[j] - bracketed
         if a * b > 0.0:
             continue
         share = a / (a - b) if a != b else 0.0

@@ -44,3 +44,14 @@ def test_branch_through_a_pitchfork_is_found_once() -> None:
     assert len(starts) == 2
     (found,) = detached_branches(frame, [main], starts, np.ones(2), settings)
     assert np.abs(frame.modal(found.x)[:, 0]).max() > 0.1
+
+
+def test_rounding_at_the_end_of_the_range_makes_no_new_branch() -> None:
+    """A solution a rounding error beyond the last frequency of a branch is on that branch."""
+    model = averaged_oscillator(0.2j, damping=0.02)
+    frame = rotating_frame(model, harmonic_load(model, "load", 0.02), 0)
+    settings = ContinuationSettings((0.9, 1.3), state_scale=0.5, parameter_scale=0.02)
+    main = continue_branch(frame, frame.start(frame.linear_response(0.9), 0.9), 0.9, settings)
+    last = int(main.p.argmax())
+    starts = [(main.x[last], float(main.p[last]) * (1.0 + 4e-16))]
+    assert detached_branches(frame, [main], starts, np.ones(1), settings) == []
