@@ -62,6 +62,7 @@ def report_inputs(context: Context) -> ReportInputs:
         model=record.model,
         polar_form=polar_text(record.model),
         resonance_reason=record.fit.resonance.reason,
+        coefficient_deviation=None if record.fit.conjugacy is None else record.fit.conjugacy.B_deviation,
         orders=_orders(record),
         forced=_optional(context, "forced_response", ForcedResponse),
         forced_points=() if forced is None else forced.points,
