@@ -53,7 +53,7 @@ class SensorChart:
 
 
 def modal_chart(trajectory: Trajectory, modes: Sequence[int]) -> ReducedTrajectory:
-    """Return y = (eta, eta') and y' = (eta', eta'') as the integrator computed them: no numerical differentiation.
+    """Return y = (eta, eta') and y' = (eta', eta'') as the trajectory carries them.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ class ForcedPoint:
     load, unit, frequency_hz : load cos(2 pi f t) of the base acceleration.
     sensor, measure : what is compared.
     rom_m, fe_m : that measure over the last five periods, m; error_percent : 100 (rom_m / fe_m - 1).
-    drift_percent : change of fe_m over the second half of the run, a bound on how far it is from its own orbit.
+    drift_percent : change of fe_m over the second half of the run; where it is not small the error still grows.
     t : (n_time,) s; rom, fe : (n_time,) m, the sensor in both models.
     """
 
