@@ -30,14 +30,15 @@ class Backbones:
 
 def forced_stages(study: Study) -> tuple[Stage, ...]:
     """Return the stages: without levels there is no forced response."""
-    stages = []
-    if study.forced_response.levels:
-        stages.append(Stage("forced_response", ForcedResponse, ("learn",), ("forced_response",), compute_response))
-        if study.forced_validation is not None and study.data is None:
-            upstream = ("preload", "modes", "ringdowns", "learn", "forced_response")
-            tables = ("ringdowns", "forced_validation")
-            stages.append(Stage("forced_validation", ForcedValidation, upstream, tables, validate_forced))
-    return (*stages, Stage("backbone", Backbones, ("learn",), (), compute_backbones))
+    backbones = Stage("backbone", Backbones, ("learn",), (), compute_backbones)
+    if not study.forced_response.levels:
+        return (backbones,)
+    response = Stage("forced_response", ForcedResponse, ("learn",), ("forced_response",), compute_response)
+    if study.forced_validation is None or study.data is not None:
+        return (response, backbones)
+    upstream = ("preload", "modes", "ringdowns", "learn", "forced_response")
+    tables = ("ringdowns", "forced_validation")
+    return (response, backbones, Stage("forced_validation", ForcedValidation, upstream, tables, validate_forced))
 
 
 def compute_response(context: Context) -> ForcedResponse:
