@@ -41,7 +41,9 @@ def verdicts(summary: dict[str, Any], limits: AcceptanceSettings) -> tuple[Verdi
     """
     return (
         *_preload(summary.get("preload", {}), limits),
+        *_ledger(summary.get("ringdowns", {}), limits),
         *_learn(summary.get("learn", {}), limits),
+        *_forced(summary.get("forced_validation", []), limits),
         *_fmu(summary.get("fmu", {}), limits),
     )
 
@@ -54,15 +56,32 @@ def _preload(part: dict[str, Any], limits: AcceptanceSettings) -> Iterator[Verdi
             yield Verdict(f"preload.{name} force error %", error, limits.preload_percent)
 
 
+def _ledger(part: dict[str, Any], limits: AcceptanceSettings) -> Iterator[Verdict]:
+    for name, motion in part.items():
+        error = _number(motion["energy_imbalance_percent"])
+        yield Verdict(f"ringdowns.{name} energy imbalance %", error, limits.ledger_percent)
+
+
 def _learn(part: dict[str, Any], limits: AcceptanceSettings) -> Iterator[Verdict]:
     for name, error in part.get("nmte_percent", {}).get("validation", {}).items():
         yield Verdict(f"learn.nmte_percent.{name}", _number(error), limits.nmte_percent)
+
+
+def _forced(part: list[dict[str, Any]], limits: AcceptanceSettings) -> Iterator[Verdict]:
+    for point in part:
+        name = f"forced_validation.{point['load']:g} {point['unit']} {point['frequency_hz']:.2f} Hz amplitude error %"
+        yield Verdict(name, abs(_number(point["error_percent"])), limits.forced_percent)
 
 
 def _fmu(part: dict[str, Any], limits: AcceptanceSettings) -> Iterator[Verdict]:
     if "fmpy_problems" in part:
         yield Verdict("fmu.fmpy_problems", part["fmpy_problems"], 0.0)
         yield Verdict("fmu.native_vs_python_rel", _number(part["native_vs_python_rel"]), limits.fmu_relative)
+    if "pythonfmu_vs_python_rel" in part:
+        error = _number(part["pythonfmu_vs_python_rel"])
+        yield Verdict("fmu.pythonfmu_vs_python_rel", error, limits.fmu_relative)
+    for name, error in part.get("replay_nmte_percent", {}).items():
+        yield Verdict(f"fmu.replay_nmte_percent.{name}", _number(error), limits.nmte_percent)
 
 
 def _number(value: float | None) -> float:

@@ -22,7 +22,7 @@ from romgen.arrays import FloatArray
 from romgen.differences import DROPPED, first_derivative, second_derivative
 from romgen.errors import InputError
 from romgen.fe_stages import build, equilibrium, translated
-from romgen.forced_validation import ForcedMotion
+from romgen.forced_motion import ForcedMotion
 from romgen.settings import RingDownSettings, Study
 from romgen.structure import EnergyLedger, Modes, Preload, RingDown
 from romgen.trajectory import Trajectory

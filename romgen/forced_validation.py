@@ -13,6 +13,7 @@ import numpy as np
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.forced_curve import ForcedCurve, ForcedResponse
+from romgen.forced_motion import ForcedMotion
 from romgen.lifted_orbit import Measure
 from romgen.manifold import Manifold, lift
 from romgen.reduced_model import ReducedModel
@@ -33,28 +34,6 @@ class OperatingPoint:
     unit: str
     frequency_hz: float
     z: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
-
-
-@dataclass(frozen=True)
-class ForcedMotion:
-    """What the finite-element model is given: starts of all points and their base acceleration.
-
-    Attributes
-    ----------
-    displacement, velocity : (n_dof, n_point) m from the equilibrium and m/s, at t = 0.
-    level : (n_point,) m/s^2; omega : (n_point,) rad/s.
-    n_step : time steps.
-    """
-
-    displacement: FloatArray = field(metadata={"unit": "m", "axes": "dof,point"})
-    velocity: FloatArray = field(metadata={"unit": "m/s", "axes": "dof,point"})
-    level: FloatArray = field(metadata={"unit": "m/s^2", "axes": "point"})
-    omega: FloatArray = field(metadata={"unit": "rad/s", "axes": "point"})
-    n_step: int
-
-    def base_acceleration(self, t: float) -> FloatArray:
-        """a cos(Omega t) of every point, (n_point,) m/s^2."""
-        return np.asarray(self.level * np.cos(self.omega * t))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from romgen.errors import NumericalError
 from romgen.etdrk4 import largest_step
 from romgen.polynomial import evaluate, jacobian, zeta
 from romgen.reduced_model import ReducedModel
-from romgen.simulate import initial_state
+from romgen.simulate import chart_inverse
 from romgen.variational import sensitivities
 
 # The window is this many periods of the slowest mode: beats of two modes need more than one.
@@ -44,7 +44,7 @@ def _candidates(model: ReducedModel, w0: FloatArray) -> tuple[ComplexArray, Comp
         V[:, int(np.argmax(model.chart.exponents[k]))] = model.chart.coefficients[:, k]
     real = np.hstack([(V[:, :m] + V[:, m:]).real, -(V[:, :m] - V[:, m:]).imag])
     parts = np.linalg.solve(real, w0)
-    return initial_state(model, w0 * model.scale), parts[:m] + 1j * parts[m:]
+    return chart_inverse(model, w0 * model.scale)[0], parts[:m] + 1j * parts[m:]
 
 
 def _gauss_newton(model: ReducedModel, r: ReducedTrajectory, z0: ComplexArray) -> tuple[ComplexArray, float]:

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
 from typing import Any
 
 from romgen.learn import Learned, Loads, learn
 from romgen.model_stages import recorded
 from romgen.reduced_model import ReducedModel
-from romgen.report.inputs import Reconstruction, Role
 from romgen.settings import Study
 from romgen.stage import Context, Stage
 from romgen.structure import Modes
-from romgen.trajectory import Trajectory
-from romgen.trajectory_error import TrajectoryError
 
 log = logging.getLogger(__name__)
 
@@ -54,20 +50,6 @@ def learned_model(context: Context) -> ReducedModel:
     return learned(context).model
 
 
-def reconstructions(context: Context) -> tuple[Reconstruction, ...]:
-    """Return every trajectory beside what the model makes of its start."""
-    record = learned(context)
-    sensors = record.model.sensors
-
-    def pairs(errors: Iterable[TrajectoryError], role: Role) -> list[Reconstruction]:
-        return [
-            Reconstruction(Trajectory(e.name, e.t, sensors, e.displacement), e.predicted, e.nmte_percent, role)
-            for e in errors
-        ]
-
-    return (*pairs(record.training, "training"), *pairs(record.validation, "validation"))
-
-
 def learning_summary(context: Context) -> dict[str, Any]:
     """Return the part "learn" of summary.json."""
     record = learned(context)
@@ -81,6 +63,9 @@ def learning_summary(context: Context) -> dict[str, Any]:
         "nmte_percent": {role: {e.name: e.nmte_percent for e in errors} for role, errors in roles.items()},
         "sensor_nmte_percent": {
             role: {e.name: e.sensor_nmte_percent for e in errors} for role, errors in roles.items()
+        },
+        "first_sample_nmte_percent": {
+            role: {e.name: e.first_sample_percent for e in errors} for role, errors in roles.items()
         },
         "static_percent": {role: {e.name: e.static_percent for e in errors} for role, errors in roles.items()},
     }

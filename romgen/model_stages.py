@@ -143,6 +143,16 @@ def read_data(context: Context) -> Recorded:
     data = context.study.data
     if data is None:
         raise InputError("the study has no data", where="[data]")
+    return share_out(data)
+
+
+def share_out(data: DataSettings) -> Recorded:
+    """Read the files of a table [data] and share the trajectories out to training and validation.
+
+    Raises
+    ------
+    InputError : a file cannot be read, a unit or a trajectory is unknown.
+    """
     trajectories = read_trajectories(data.files, data.sensors, data.unit)
     return Recorded(_chosen(trajectories, data.training, data), _chosen(trajectories, data.validation, data))
 

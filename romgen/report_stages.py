@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TypeVar
 
 from romgen.fmu.check import SEED
@@ -10,15 +11,17 @@ from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
 from romgen.learn import Learned
-from romgen.learning_stages import learned, reconstructions
+from romgen.learning_stages import learned
 from romgen.model_stages import RingDowns
 from romgen.polar_form import polar_text
 from romgen.provenance import Provenance, collect_provenance
-from romgen.report.inputs import OrderTrial, ReportInputs, StageCost
+from romgen.report.inputs import OrderTrial, Reconstruction, ReportInputs, Role, StageCost
 from romgen.report.write import ReportFiles, write_report
 from romgen.settings import Study, study_warnings
 from romgen.stage import Context, Stage, study_key
 from romgen.structure import Modes, Preload, Structure
+from romgen.trajectory import Trajectory
+from romgen.trajectory_error import TrajectoryError
 
 Record = TypeVar("Record")
 
@@ -91,3 +94,17 @@ def _orders(record: Learned) -> tuple[OrderTrial, ...]:
 
 def _optional(context: Context, stage: str, cls: type[Record]) -> Record | None:
     return context.record(stage, cls) if stage in context.infos() else None
+
+
+def reconstructions(context: Context) -> tuple[Reconstruction, ...]:
+    """Return every trajectory beside what the model makes of its start."""
+    record = learned(context)
+    sensors = record.model.sensors
+
+    def pairs(errors: Iterable[TrajectoryError], role: Role) -> list[Reconstruction]:
+        return [
+            Reconstruction(Trajectory(e.name, e.t, sensors, e.displacement), e.predicted, e.nmte_percent, role)
+            for e in errors
+        ]
+
+    return (*pairs(record.training, "training"), *pairs(record.validation, "validation"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from romgen.etdrk4 import largest_step, march
 from romgen.polynomial import evaluate, jacobian, zeta
 from romgen.reduced_model import ReducedModel
 
+log = logging.getLogger(__name__)
 Hold = Literal["constant", "linear"]
 # The polished chart inverse stops at rounding; Newton from H converges quadratically or not at all.
 NEWTON_TOLERANCE = 1e-13
@@ -141,7 +143,9 @@ def sensors(model: ReducedModel, z: ComplexArray) -> tuple[FloatArray, FloatArra
 
 
 def initial_state(model: ReducedModel, y0: FloatArray) -> ComplexArray:
-    """Return z with Re(T zeta^E) = y0 / s: start z = H (y0/s)^E, Newton where it converges, else the start itself.
+    """Return z with Re(T zeta^E) = y0 / s: start z = H (y0/s)^E, Newton where it converges, else that start.
+
+    A start that Newton could not polish is logged as a warning with what it misses of y0.
 
     Parameters
     ----------
@@ -151,22 +155,35 @@ def initial_state(model: ReducedModel, y0: FloatArray) -> ComplexArray:
     -------
     (m,) z.
     """
+    z, misfit = chart_inverse(model, y0)
+    if misfit > NEWTON_TOLERANCE:
+        log.warning(
+            "%s: start state misses y by %.2g of its size; it lies outside the charted range", model.name, misfit
+        )
+    return z
+
+
+def chart_inverse(model: ReducedModel, y0: FloatArray) -> tuple[ComplexArray, float]:
+    """Return z (m,) for y0 (2m,) and what it misses, max abs(Re(T zeta^E) - y0/s) / max(1, abs(y0/s))."""
     w0 = y0 / model.scale
     start: ComplexArray = evaluate(model.inverse_chart, w0[None])[0]
     z = start
     m = len(start)
+    first = np.inf
     for _ in range(NEWTON_STEPS):
-        misfit = evaluate(model.chart, zeta(z[None]))[0].real - w0
-        if np.abs(misfit).max() <= NEWTON_TOLERANCE * max(1.0, np.abs(w0).max()):
-            return z
+        miss = evaluate(model.chart, zeta(z[None]))[0].real - w0
+        size = float(np.abs(miss).max()) / max(1.0, float(np.abs(w0).max()))
+        first = min(first, size) if z is start else first
+        if size <= NEWTON_TOLERANCE:
+            return z, size
         J = jacobian(model.chart, zeta(z[None]))[0]
         tangent = np.hstack([(J[:, :m] + J[:, m:]).real, -(J[:, :m] - J[:, m:]).imag])
         try:
-            change = np.linalg.solve(tangent, misfit)
+            change = np.linalg.solve(tangent, miss)
         except np.linalg.LinAlgError:
-            return start
+            break
         z = z - (change[:m] + 1j * change[m:])
         # T is trusted on the data cloud only; a root far from H(y0/s) belongs to another branch.
         if not np.abs(z - start).max() <= 0.5 * max(float(np.abs(start).max()), 1e-12):
-            return start
-    return start
+            break
+    return start, first

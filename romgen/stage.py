@@ -16,6 +16,7 @@ from romgen.progress import Report
 from romgen.result_store import ResultStore, StageInfo
 from romgen.segments import SegmentStore
 from romgen.settings import DataSettings, Settings, Study
+from romgen.source_digest import source_digest
 from romgen.store import SCHEMA_VERSION
 
 if TYPE_CHECKING:
@@ -85,9 +86,9 @@ class Stage:
 
 
 def stage_keys(stages: Sequence[Stage], study: Study) -> dict[str, str]:
-    """Hash of every stage over its own tables, the keys upstream, the version and the file schema.
+    """Hash of every stage over its own tables, its source text, the keys upstream, the version and the file schema.
 
-    Equal keys mean equal results; a changed table changes the keys of exactly the stages that depend on it.
+    Equal keys mean equal results; a changed table or module changes the keys of exactly the stages that depend on it.
     """
     keys: dict[str, str] = {}
     for stage in stages:
@@ -95,6 +96,7 @@ def stage_keys(stages: Sequence[Stage], study: Study) -> dict[str, str]:
             "stage": stage.name,
             "version": romgen.__version__,
             "schema": SCHEMA_VERSION,
+            "source": source_digest(stage.compute.__module__),
             "tables": {table: table_content(study, table) for table in stage.tables},
             "upstream": [keys[name] for name in stage.upstream],
         }

@@ -15,7 +15,7 @@ from romgen.manifold import Manifold, nmte_blocks
 from romgen.metrics import nmte_percent
 from romgen.polynomial import evaluate
 from romgen.reduced_model import ReducedModel
-from romgen.simulate import coordinates, free_motion, initial_state, sensors
+from romgen.simulate import chart_inverse, coordinates, free_motion, sensors
 from romgen.trajectory import Trajectory
 
 
@@ -29,6 +29,7 @@ class TrajectoryError:
     nmte_percent : NMTE in full displacement coordinates where snapshots exist, else of the sensors; inf where the model
         diverges.
     sensor_nmte_percent : NMTE of the sensor displacements.
+    first_sample_percent : the same, but started from the first sample alone instead of the first window.
     static_percent : NMTE of the sensors lifted from the true reduced coordinates: the error of the manifold alone.
     start : (m,) z of the model at t[0].
     t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m, predicted is nan from a divergence on.
@@ -37,6 +38,7 @@ class TrajectoryError:
     name: str
     nmte_percent: float
     sensor_nmte_percent: float
+    first_sample_percent: float
     static_percent: float
     start: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
     t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
@@ -52,12 +54,14 @@ def trajectory_error(
     finite = np.isfinite(z).all()
     predicted = sensors(model, z)[0]
     sensor_error = nmte_percent(r.displacement, predicted) if finite else float("inf")
+    unfitted = free_motion(model, r.t, chart_inverse(model, r.y[0])[0])
+    cold = nmte_percent(r.displacement, sensors(model, unfitted)[0]) if np.isfinite(unfitted).all() else float("inf")
     error = sensor_error
     if finite and full is not None and trajectory.snapshots is not None and trajectory.snapshot_index is not None:
         rows, snapshots = snapshot_rows(trajectory, r)
         error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
     static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
-    return TrajectoryError(r.name, error, sensor_error, static, z0, r.t, r.displacement, predicted)
+    return TrajectoryError(r.name, error, sensor_error, cold, static, z0, r.t, r.displacement, predicted)
 
 
 def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, ComplexArray]:
@@ -65,7 +69,7 @@ def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[Compl
     try:
         z0 = fitted_start(model, r)
     except NumericalError:
-        z0 = initial_state(model, r.y[0])
+        z0 = chart_inverse(model, r.y[0])[0]
     return z0, free_motion(model, r.t, z0)
 
 

@@ -31,9 +31,10 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
 
     Raises
     ------
-    InputError : names file, trajectory, row and value: not readable, wrong number of sensors, NaN, time that does not
-        increase, a constant sensor.
+    InputError : names file, trajectory, row and value: unknown unit, not readable, wrong number of sensors, NaN,
+        time that does not increase, a constant sensor.
     """
+    _factor(unit, "[data] unit")
     trajectories: list[Trajectory] = []
     for path in map(Path, files):
         read = _READERS.get(path.suffix.lower())

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from romgen.cli.failures import reported
 from romgen.cli.options import Json, Quiet, StudyPath, open_study
 from romgen.cli.output import Output
+from romgen.model_stages import share_out
 from romgen.settings import Study, estimate, study_warnings
 
 
@@ -15,6 +16,8 @@ from romgen.settings import Study, estimate, study_warnings
 def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False) -> None:
     """Check a study: keys, values, names, files, units; then estimate its memory and run time."""
     study = open_study(study_path)
+    if study.data is not None:
+        share_out(study.data)
     out = Output(quiet=quiet, as_json=json_output)
     warnings, size = study_warnings(study) + _missing(study), estimate(study)
     for warning in warnings:

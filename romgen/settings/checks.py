@@ -80,7 +80,8 @@ def _surface_problems(study: Study) -> Iterator[str]:
     named += [(f"[loads[{k}]] surface:", item.surface) for k, item in enumerate(study.loads)]
     for where, surface in named:
         if surface not in known:
-            yield _unknown(where, "surface", surface, known)
+            own = [name for name in known if name.split(".")[0] == surface.split(".")[0]]
+            yield _unknown(where, "surface", surface, own or known)
 
 
 def _contact_problems(study: Study) -> Iterator[str]:

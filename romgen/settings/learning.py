@@ -62,3 +62,5 @@ class AcceptanceSettings(Settings):
     nmte_percent: float = Field(default=10.0, gt=0.0)
     fmu_relative: float = Field(default=1e-9, gt=0.0)
     preload_percent: float = Field(default=0.1, gt=0.0)
+    ledger_percent: float = Field(default=0.5, gt=0.0)
+    forced_percent: float = Field(default=10.0, gt=0.0)

@@ -16,7 +16,16 @@ def summary(**changes: Any) -> dict[str, Any]:
     content = {
         "preload": {"interfaces": {"joint": pair | changes.get("pair", {})}},
         "learn": {"nmte_percent": {"training": {"a": 99.0}, "validation": {"b": changes.get("nmte", 4.9)}}},
-        "fmu": {"fmpy_problems": changes.get("problems", 0), "native_vs_python_rel": changes.get("rel", 1e-12)},
+        "ringdowns": {"b": {"energy_imbalance_percent": changes.get("ledger", 0.2)}},
+        "forced_validation": [
+            {"load": 2.0, "unit": "m/s^2", "frequency_hz": 107.5, "error_percent": changes.get("forced", -9.0)}
+        ],
+        "fmu": {
+            "fmpy_problems": changes.get("problems", 0),
+            "native_vs_python_rel": changes.get("rel", 1e-12),
+            "pythonfmu_vs_python_rel": changes.get("python_rel", 1e-12),
+            "replay_nmte_percent": {"b": changes.get("replay", 4.9)},
+        },
     }
     return {key: value for key, value in content.items() if key not in changes.get("absent", ())}
 
@@ -27,7 +36,7 @@ def missed(**changes: Any) -> list[str]:
 
 def test_training_errors_are_not_judged() -> None:
     assert missed() == []
-    assert len(verdicts(summary(), LIMITS)) == 4
+    assert len(verdicts(summary(), LIMITS)) == 8
 
 
 def test_each_limit_can_be_missed() -> None:
@@ -37,10 +46,14 @@ def test_each_limit_can_be_missed() -> None:
     assert missed(nmte=None) == ["learn.nmte_percent.b"]
     assert missed(problems=1) == ["fmu.fmpy_problems"]
     assert missed(rel=2e-9) == ["fmu.native_vs_python_rel"]
+    assert missed(ledger=0.6) == ["ringdowns.b energy imbalance %"]
+    assert missed(forced=-10.1) == ["forced_validation.2 m/s^2 107.50 Hz amplitude error %"]
+    assert missed(python_rel=2e-9) == ["fmu.pythonfmu_vs_python_rel"]
+    assert missed(replay=5.1) == ["fmu.replay_nmte_percent.b"]
     assert missed(rel=None) == ["fmu.native_vs_python_rel"]
 
 
 def test_what_is_absent_or_undetermined_is_not_judged() -> None:
-    assert verdicts(summary(absent=("preload", "learn", "fmu")), LIMITS) == ()
-    assert len(verdicts(summary(pair={"applied_force_n": None}), LIMITS)) == 3
+    assert verdicts(summary(absent=tuple(summary())), LIMITS) == ()
+    assert len(verdicts(summary(pair={"applied_force_n": None}), LIMITS)) == 7
     assert not Verdict("x", math.nan, 1.0).passed

@@ -56,6 +56,27 @@ def test_problems_as_json(tmp_path: Path) -> None:
     assert json.loads(result.stdout)["exit_code"] == 2
 
 
+@pytest.mark.parametrize(
+    ("key", "entry", "message"),
+    [
+        ("unit", '"furlong"', "unknown unit"),
+        ("training", "[0, 99]", "no such trajectory in the files"),
+        ("files", '["junk.mat"]', "junk.mat: "),
+    ],
+)
+def test_check_opens_the_data(key: str, entry: str, message: str, tmp_path: Path) -> None:
+    study = write_lab_study(tmp_path)
+    (tmp_path / "junk.mat").write_bytes(b"nothing that MATLAB wrote" * 20)
+    lines = study.read_text().splitlines()
+    kept = [line for line in lines if not line.startswith(f"{key} =")]
+    kept.insert(kept.index("[data]") + 1, f"{key} = {entry}")
+    study.write_text("\n".join(kept) + "\n")
+    result = romgen_cli("check", study)
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert message in result.stderr
+
+
 def test_check_says_what_it_will_cost() -> None:
     result = romgen_cli("check", ROOT / "models" / "clamped_panel")
     assert result.exit_code == 0
