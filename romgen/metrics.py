@@ -26,15 +26,6 @@ def nmte_percent(x: FloatArray, x_rec: FloatArray) -> float:
     return 100.0 * float(np.linalg.norm(x - x_rec, axis=1).mean()) / largest
 
 
-def sqrt2_rms(x: FloatArray) -> FloatArray:
-    """Return sqrt(2) RMS of each column about its mean, x (n_time, n) uniform over whole periods.
-
-    Equals the amplitude of a pure cosine; the displacement measure of the experiment.
-    """
-    amplitude: FloatArray = np.sqrt(2.0) * x.std(axis=0)
-    return amplitude
-
-
 @dataclass(frozen=True)
 class Instantaneous:
     """Slowly varying amplitude, frequency and damping ratio of one decaying oscillation.

@@ -10,7 +10,7 @@ from romgen.conjugacy_residual import ConjugacyProblem, linearise, residual, sol
 from romgen.differences import first_derivative, resample, second_derivative
 from romgen.errors import NumericalError
 from romgen.manifold import ManifoldFit, lift, nmte_blocks
-from romgen.metrics import analytic_signal, instantaneous, nmte_percent, sqrt2_rms
+from romgen.metrics import analytic_signal, instantaneous, nmte_percent
 from romgen.polynomial import PolynomialMap, evaluate, exponents
 from romgen.reduced_dynamics import decaying_modes
 from romgen.resonance import automatic_resonance, integer_resonance, tolerance_resonance
@@ -175,4 +175,3 @@ def test_measures_of_a_known_decay() -> None:
     assert measured.frequency_hz == pytest.approx(110.0, rel=2e-3)
     assert np.median(measured.damping_ratio) == pytest.approx(3 / (2 * np.pi * 110), rel=1e-2)
     assert np.abs(analytic_signal(t, np.cos(2 * np.pi * 110 * t), (70, 150)))[5000:-5000] == pytest.approx(1, rel=1e-3)
-    assert sqrt2_rms(2 * np.cos(2 * np.pi * np.arange(100) / 100)[:, None] + 5) == pytest.approx(2.0)
