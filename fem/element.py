@@ -33,12 +33,14 @@ class ReferenceElement:
     nodes : (n_local, dim) reference coordinates in [0, 1], VTK order.
     faces : (n_face, n_face_local) local nodes of each face, outward orientation; empty for surfaces.
     face_name : element of the faces, "" for surfaces.
+    edges : (n_edge, 3) local nodes of each edge: two ends and the node between them.
     """
 
     name: str
     nodes: FloatArray
     faces: IntArray
     face_name: str
+    edges: IntArray
 
     def shape(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Shape functions and gradients at reference points.
@@ -149,4 +151,13 @@ def reference_element(name: str) -> ReferenceElement:
         )
     solid = bool(face_of[name])
     faces = _face_table(name) if solid else np.empty((0, 0), dtype=np.int64)
-    return ReferenceElement(name, _nodes(name), faces, face_of[name])
+    return ReferenceElement(name, _nodes(name), faces, face_of[name], _edge_table(name))
+
+
+def _edge_table(name: str) -> IntArray:
+    """Middle nodes follow the corners in the order of the edges."""
+    ring = [(0, 1), (1, 2), (2, 3), (3, 0)]
+    ends = {"tet10": _TET_EDGES, "tri6": [(0, 1), (1, 2), (2, 0)], "hex20": _HEX_EDGES, "hex27": _HEX_EDGES}
+    pairs = ends.get(name, ring)
+    n_corner = {"tet10": 4, "tri6": 3, "hex20": 8, "hex27": 8}.get(name, 4)
+    return np.array([(a, b, n_corner + k) for k, (a, b) in enumerate(pairs)], dtype=np.int64)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
-from fem.model import AXES, Model
+from fem.model import Model
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,9 @@ def _group(model: Model, body: str, without: int) -> set[str]:
 
 
 def _held(model: Model, body: str, normal: FloatArray) -> bool:
-    directions = [d for s in model.supports if s.surface.split(".")[0] == body for d in s.directions]
-    return any(abs(normal[AXES[d]]) > 1e-3 for d in directions)
+    start, stop = _dofs(model, body)
+    directions = (~model.free[start:stop].reshape(-1, 3)).any(axis=0)
+    return bool(np.any(np.abs(normal[directions]) > 1e-3))
 
 
 def _load(model: Model, body: str) -> FloatArray:

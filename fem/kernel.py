@@ -1,7 +1,7 @@
 """Compiled Total Lagrangian kernels: internal force, tangent and mass for any solid element.
 
 Shape gradients with respect to the undeformed coordinates and integration weights come in as arrays, so that one kernel
-serves all element types. St. Venant-Kirchhoff: S = lambda tr(E) I + 2 mu E, E = (F'F - I)/2, P = F S.
+serves all element types. St. Venant-Kirchhoff: S = S_0 + lambda tr(E) I + 2 mu E, E = (F'F - I)/2, P = F S.
 Several load cases (trajectories) march together: fields are (n_dof, n_case), degree of freedom 3 node + component.
 """
 
@@ -20,6 +20,7 @@ def element_forces(
     weights: FloatArray,
     cells: IntArray,
     lame: FloatArray,
+    initial: FloatArray,
     u: FloatArray,
     v: FloatArray,
     beta: float,
@@ -37,6 +38,7 @@ def element_forces(
     weights : (n_cell, n_point) m^3.
     cells : (n_cell, n_local).
     lame : (n_cell, 2) lambda and mu, Pa.
+    initial : (n_cell, 3, 3) S_0 in Pa, or (0, 3, 3) for none; it adds S_0:E to the energy.
     u, v : (n_dof, n_case) m and m/s.
     beta : s; 0 leaves ``viscous`` alone and does not read v.
     forces, viscous : (n_cell, n_local, 3, n_case) N, overwritten.
@@ -63,7 +65,7 @@ def element_forces(
                 w = weights[e, q]
                 _gradient(ue, gradients[e, q], F)
                 # E from grad u, not from F'F - I: no cancellation at small strain.
-                energy += w * _stress(F, lam, mu, S)
+                energy += w * _stress(F, lam, mu, initial, e, S)
                 _product(F, S, w, P)
                 _add_divergence(P, gradients[e, q], fe)
                 if beta > 0.0:
@@ -127,8 +129,8 @@ def _viscous_stress(F: FloatArray, D: FloatArray, lam: float, mu: float, S: Floa
 
 
 @inlined
-def _stress(F: FloatArray, lam: float, mu: float, S: FloatArray) -> float:
-    """From grad u in F: F <- I + grad u, S <- lambda tr(E) I + 2 mu E; returns S:E/2."""
+def _stress(F: FloatArray, lam: float, mu: float, initial: FloatArray, cell: int, S: FloatArray) -> float:
+    """From grad u in F: F <- I + grad u, S <- S_0 + lambda tr(E) I + 2 mu E; returns (S + S_0):E/2."""
     trace = 0.0
     for i in range(3):
         for j in range(3):
@@ -139,7 +141,11 @@ def _stress(F: FloatArray, lam: float, mu: float, S: FloatArray) -> float:
     for i in range(3):
         for j in range(3):
             energy += mu * S[i, j] * S[i, j]
-            S[i, j] *= 2.0 * mu
+            if len(initial) > 0:
+                energy += initial[cell, i, j] * S[i, j]
+                S[i, j] = 2.0 * mu * S[i, j] + initial[cell, i, j]
+            else:
+                S[i, j] *= 2.0 * mu
         S[i, i] += lam * trace
         F[i, i] += 1.0
     return energy
@@ -166,6 +172,7 @@ def element_tangents(
     weights: FloatArray,
     cells: IntArray,
     lame: FloatArray,
+    initial: FloatArray,
     u: FloatArray,
     geometric_share: float,
     tangents: FloatArray,
@@ -194,7 +201,7 @@ def element_tangents(
                     for a in range(n_local):
                         s += u[3 * cells[e, a] + i] * gradients[e, q, j, a]
                     F[i, j] = s
-            _stress(F, lam, mu, S)
+            _stress(F, lam, mu, initial, e, S)
             for i in range(3):
                 for j in range(3):
                     B[i, j] = F[i, 0] * F[j, 0] + F[i, 1] * F[j, 1] + F[i, 2] * F[j, 2]

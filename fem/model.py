@@ -9,29 +9,29 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem.arrays import BoolArray, FloatArray, IntArray
-from fem.assembly import Cells, make_cells, mass_blocks
+from fem.assembly import Cells, lumped_masses, make_cells, mass_blocks
+from fem.body import Body, locate
 from fem.contact import Contact, ContactLaw, contact_pair, join
 from fem.errors import FemInputError
-from fem.material import Material
-from fem.mesh import Mesh
+from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Traction, load_vector
 from fem.pairing import surface_points
 from fem.sparse_product import SparseProduct
+from fem.supports import AXES, Support, held
 
-AXES = {"x": 0, "y": 1, "z": 2}
-
-
-@dataclass(frozen=True)
-class Body:
-    """A meshed part.
-
-    ``kinematics`` "green_lagrange" keeps all terms; "linear" drops the quadratic strain of this body: its error is of
-    the order of its strains and rotations, and it saves the element loop.
-    """
-
-    name: str
-    mesh: Mesh
-    material: Material
-    kinematics: str = "green_lagrange"
+__all__ = [
+    "AXES",
+    "Body",
+    "Clamp",
+    "Force",
+    "Gravity",
+    "Model",
+    "Pair",
+    "PointForce",
+    "Support",
+    "Traction",
+    "build_model",
+    "default_penalty",
+]
 
 
 @dataclass(frozen=True)
@@ -47,23 +47,6 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Support:
-    """Fixed directions ("x", "y", "z") on a surface."""
-
-    surface: str
-    directions: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Clamp:
-    """A dead pressure on a surface that sums to ``total_force`` N against its outward normals."""
-
-    name: str
-    surface: str
-    total_force: float
-
-
-@dataclass(frozen=True)
 class Model:
     """The assembled structure; degree of freedom 3 node + direction.
 
@@ -74,8 +57,8 @@ class Model:
     nonlinear : cells with Green-Lagrange strain, per body; stiffness : (n_dof, n_dof) of the linear bodies, N/m.
     mass : (n_dof, n_dof) kg, consistent.
     contact : all interfaces; pairs : their definitions.
-    free : (n_dof,) False where a support holds.
-    load : (n_dof,) N, sum of the clamps at load factor 1; loads : (n_clamp, n_dof) each one.
+    free : (n_dof,) False where a support holds; prescribed : (n_dof,) m, displacement there at load factor 1.
+    load : (n_dof,) N, sum of clamps and other loads at load factor 1; loads : (n_load, n_dof) each one, clamps first.
     """
 
     bodies: tuple[Body, ...]
@@ -91,6 +74,7 @@ class Model:
     free: BoolArray
     load: FloatArray
     loads: FloatArray
+    prescribed: FloatArray
 
     @property
     def n_dof(self) -> int:
@@ -99,7 +83,7 @@ class Model:
 
     def facets(self, name: str) -> IntArray:
         """Global node numbers of the facets of surface "<body>.<surface>"."""
-        index, surface = _locate(self.bodies, name)
+        index, surface = locate(self.bodies, name)
         return np.asarray(self.bodies[index].mesh.surface(surface) + self.offsets[index])
 
     def elastic_force(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -135,6 +119,13 @@ class Model:
         keep = sp.diags(self.free.astype(float))
         return (keep @ matrix @ keep + sp.diags((~self.free).astype(float))).tocsr()
 
+    def lumped_mass(self) -> FloatArray:
+        """Diagonal mass (n_dof,) in kg by the scheme of Hinton, Rock and Zienkiewicz, see ``lumped_masses``."""
+        mass = np.zeros(len(self.points))
+        for body, offset in zip(self.bodies, self.offsets, strict=True):
+            np.add.at(mass, body.mesh.cells + offset, lumped_masses(body.mesh, body.material.density))
+        return np.repeat(mass, 3)
+
     def direction(self, axis: str) -> FloatArray:
         """b: 1 in the degrees of freedom along an axis, (n_dof,)."""
         b = np.zeros(self.n_dof)
@@ -148,10 +139,11 @@ def build_model(
     pairs: Sequence[Pair] = (),
     supports: Sequence[Support] = (),
     clamps: Sequence[Clamp] = (),
+    loads: Sequence[Load] = (),
 ) -> Model:
-    """Assemble bodies, interfaces, supports and clamping pressures into a model.
+    """Assemble bodies, interfaces, supports, clamping pressures and other dead loads into a model.
 
-    Unknown names, inverted cells and interfaces without partners raise ``FemInputError``.
+    Unknown names, inverted cells, interfaces without partners and numbers that are not finite raise ``FemInputError``.
     """
     bodies = tuple(bodies)
     names = [body.name for body in bodies]
@@ -163,18 +155,16 @@ def build_model(
     n_node = len(points)
     nonlinear, stiffness, mass = [], sp.csr_matrix((3 * n_node, 3 * n_node)), sp.csr_matrix((3 * n_node, 3 * n_node))
     for body, offset in zip(bodies, offsets, strict=True):
-        lame = (body.material.lame_lambda, body.material.shear_modulus)
-        cells = make_cells(body.mesh, int(offset), n_node, lame)
+        cells = make_cells(body, int(offset), n_node)
         mass = mass + cells.assemble(mass_blocks(body.mesh, body.material.density))
         if body.kinematics == "linear":
             stiffness = stiffness + cells.assemble(cells.element_tangents(np.zeros(3 * n_node)))
-        elif body.kinematics == "green_lagrange":
-            nonlinear.append(cells)
         else:
-            advice = 'choose "green_lagrange" or "linear"'
-            raise FemInputError("unknown kinematics", where=f"body {body.name}", value=body.kinematics, advice=advice)
+            nonlinear.append(cells)
     contact = join(tuple(_contact(bodies, offsets, points, pair) for pair in pairs), 3 * n_node)
-    loads = np.array([_pressure(bodies, offsets, points, clamp) for clamp in clamps]).reshape(-1, 3 * n_node)
+    assembly = Assembly(bodies, offsets, points, mass)
+    vectors = np.array([load_vector(load, assembly) for load in (*clamps, *loads)]).reshape(-1, 3 * n_node)
+    free, prescribed = held(bodies, offsets, n_node, supports)
     return Model(
         bodies,
         offsets,
@@ -186,9 +176,10 @@ def build_model(
         tuple(pairs),
         tuple(supports),
         tuple(clamps),
-        _free(bodies, offsets, n_node, supports),
-        loads.sum(axis=0),
-        loads,
+        free,
+        vectors.sum(axis=0),
+        vectors,
+        prescribed,
     )
 
 
@@ -201,18 +192,9 @@ def default_penalty(body: Body, facets: IntArray) -> float:
     return body.material.young_modulus / float(np.sqrt(surface.area.sum() / len(facets)))
 
 
-def _locate(bodies: Sequence[Body], name: str) -> tuple[int, str]:
-    body, _, surface = name.partition(".")
-    names = [b.name for b in bodies]
-    if body not in names or not surface:
-        advice = f"surfaces are <body>.<surface> with the bodies {', '.join(names)}"
-        raise FemInputError("unknown surface", where="model", value=name, advice=advice)
-    return names.index(body), surface
-
-
 def _contact(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, pair: Pair) -> Contact:
-    s, slave = _locate(bodies, pair.slave)
-    m, master = _locate(bodies, pair.master)
+    s, slave = locate(bodies, pair.slave)
+    m, master = locate(bodies, pair.master)
     facets = bodies[s].mesh.surface(slave)
     default = default_penalty(bodies[s], facets)
     law = ContactLaw(
@@ -221,24 +203,3 @@ def _contact(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, pair
         pair.friction,
     )
     return contact_pair(pair.name, points, facets + offsets[s], bodies[m].mesh.surface(master) + offsets[m], law)
-
-
-def _pressure(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, clamp: Clamp) -> FloatArray:
-    index, surface = _locate(bodies, clamp.surface)
-    at = surface_points(points, bodies[index].mesh.surface(surface) + offsets[index])
-    density = -clamp.total_force / at.area.sum() * at.area[:, None] * at.normals
-    load = np.zeros((len(points), 3))
-    np.add.at(load, at.nodes, at.shape[:, :, None] * density[:, None, :])
-    return load.ravel()
-
-
-def _free(bodies: Sequence[Body], offsets: IntArray, n_node: int, supports: Sequence[Support]) -> BoolArray:
-    free = np.ones((n_node, 3), dtype=bool)
-    for support in supports:
-        index, surface = _locate(bodies, support.surface)
-        nodes = np.unique(bodies[index].mesh.surface(surface)) + offsets[index]
-        for direction in support.directions:
-            if direction not in AXES:
-                raise FemInputError("unknown direction", where=f"support {support.surface}", value=direction)
-            free[nodes, AXES[direction]] = False
-    return free.ravel()

@@ -43,6 +43,70 @@ def test_tangent_is_the_derivative_of_the_force(element: str) -> None:
     np.testing.assert_allclose(model.elastic_tangent(u) @ d, expected, atol=1e-12 * np.abs(expected).max())
 
 
+def _prestressed(element: str) -> Model:
+    """The distorted mesh with another initial stress in every cell, of the size of the elastic one."""
+    body = _CASES[element].bodies[0]
+    stress = np.random.default_rng(5).standard_normal((len(body.mesh.cells), 3, 3)) * 0.1 * STEEL.young_modulus
+    return build_model([replace(body, initial_stress=stress + np.swapaxes(stress, 1, 2))])
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_initial_stress_enters_force_tangent_and_energy(element: str) -> None:
+    """Force = gradient of the energy and tangent = gradient of the force, both by exact differences of polynomials.
+
+    Along a line the energy is of fourth order and the force of third, so that Richardson's combination of two central
+    differences is exact for both; what is left is roundoff.
+    """
+    model = _prestressed(element)
+    u, d = wave(model.points, 0.1), np.random.default_rng(1).standard_normal(model.n_dof)
+    d *= 0.1 / np.abs(d).max()
+
+    def central(t: float) -> tuple[np.ndarray, float]:
+        plus, minus = (model.elastic_force((u + s * t * d)[:, None]) for s in (1.0, -1.0))
+        return (plus[0] - minus[0])[:, 0] / (2.0 * t), float(plus[1][0] - minus[1][0]) / (2.0 * t)
+
+    (half, slope_half), (full, slope_full) = central(0.5), central(1.0)
+    expected = (4.0 * half - full) / 3.0
+    np.testing.assert_allclose(model.elastic_tangent(u) @ d, expected, atol=1e-12 * np.abs(expected).max())
+    assert _force(model, u) @ d == pytest.approx((4.0 * slope_half - slope_full) / 3.0, rel=1e-11)
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_initial_stress_at_rest_has_the_resultant_of_the_stress(element: str) -> None:
+    """At u = 0 a uniform S_0 is held by S_0 n on the faces: 7e7 Pa pulls on 0.8 m x 0.6 m along x."""
+    mesh = box((1.0, 0.8, 0.6), (2, 1, 1), element)
+    stress = np.diag([7e7, 0.0, 0.0])
+    model = build_model([replace(_CASES[element].bodies[0], mesh=mesh, initial_stress=stress)])
+    force = _force(model, np.zeros(model.n_dof)).reshape(-1, 3)
+    assert force[mesh.nodes("x_max")].sum(axis=0) == pytest.approx([7e7 * 0.48, 0.0, 0.0], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"initial_stress": np.zeros(6)}, "not an initial stress"),
+        ({"initial_stress": np.diag([np.nan, 0.0, 0.0])}, "not an initial stress"),
+        ({"initial_stress": np.triu(np.ones((3, 3)))}, "not symmetric"),
+        ({"initial_stress": np.eye(3), "kinematics": "linear"}, "linear body"),
+    ],
+)
+def test_initial_stress_that_makes_no_sense_is_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(FemInputError, match=message):
+        replace(_CASES["hex20"].bodies[0], **change)
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_lumped_mass_is_positive_and_keeps_mass_and_a_constant_acceleration(element: str) -> None:
+    """HRZ keeps the mass of every cell; on a box its first moment too, so that gravity has no moment."""
+    box_model = single(box((1.0, 0.8, 0.6), (2, 1, 1), element))
+    for model in (_CASES[element], box_model):
+        lumped = model.lumped_mass()
+        assert np.all(lumped > 0.0)
+        assert lumped.sum() / 3.0 == pytest.approx(STEEL.density * model.nonlinear[0].weights.sum(), rel=1e-12)
+    centre = lumped[::3] @ box_model.points / lumped[::3].sum()
+    assert centre == pytest.approx([0.5, 0.4, 0.3], abs=1e-12)
+
+
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_viscous_force_is_beta_times_the_material_tangent(element: str) -> None:
     """S_v = beta C:E' with E' = sym(F' grad v) makes the nodal force beta K_material(u) v at any u, exactly."""
