@@ -10,10 +10,17 @@ import scipy.sparse as sp
 from fem.arrays import FloatArray, IntArray
 from fem.errors import FemInputError
 from fem.friction import traction_tangents, tractions
-from fem.pairing import Projection, SurfacePoints, project, surface_points
+from fem.pairing import Projection, SurfacePoints, facet_sizes, mean_size, project
+from fem.segmentation import segment_points
 
 _FACING = 0.5
 """Surfaces face each other where their normals are within 60 degrees of opposite."""
+
+_OVER_KINK = 0.05
+"""Share of a master facet by which the closest point may miss it where two facets meet at an angle."""
+
+_SLIDE = 0.1
+"""Slip that counts as small, in sizes of the master facet: the force is then misplaced by at most that distance."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,7 @@ class Contact:
     operator : B, (3 n_point, n_dof) sparse, rows normal, tangent 1, tangent 2 of each point.
     area : (n_point,) m^2; initial_gap : (n_point,) m; law : (n_point, 3) k_n, k_t, mu.
     points : (n_point, 3) m; names : pairs; pair : (n_point,) index into names.
+    facet_size : (n_point,) m, slave; slide_limit : (n_point,) m, slip up to which the frozen projection serves.
     """
 
     operator: sp.csr_matrix
@@ -65,6 +73,8 @@ class Contact:
     points: FloatArray
     names: tuple[str, ...]
     pair: IntArray
+    facet_size: FloatArray
+    slide_limit: FloatArray
 
     @property
     def n_point(self) -> int:
@@ -130,13 +140,13 @@ def contact_pair(
     Parameters
     ----------
     points : (n_node, 3) all nodes of the model, m.
-    slave, master : (n_facet, n_face_local) global node numbers; the integration points belong to the slave.
+    slave, master : (n_facet, n_face_local) global node numbers; the integration points lie on the slave.
     reach : largest initial distance of a pair in m; default half the mean slave facet size. Slave points without a
         partner that faces them are no contact points.
     """
-    source = surface_points(points, slave)
-    distance = reach if reach is not None else 0.5 * float(np.sqrt(source.area.sum() / len(slave)))
-    target = project(points, source.points, master, distance)
+    distance = reach if reach is not None else 0.5 * mean_size(points, slave)
+    source = segment_points(points, slave, master, distance)
+    target = project(points, source.points, master, distance, slack=_OVER_KINK)
     paired = target.found & (np.einsum("gi,gi->g", source.normals, target.normals) < -_FACING)
     if not paired.any():
         advice = "check that the surfaces face each other, or enlarge the reach"
@@ -152,6 +162,8 @@ def contact_pair(
         source.points[paired],
         (name,),
         np.zeros(int(paired.sum()), dtype=np.int64),
+        facet_sizes(points, slave)[source.facet[paired]],
+        _SLIDE * facet_sizes(points, master)[target.facet[paired]],
     )
 
 
@@ -159,8 +171,8 @@ def join(contacts: tuple[Contact, ...], n_dof: int) -> Contact:
     """All pairs of a model as one contact; none gives an empty one."""
     if not contacts:
         empty = np.empty(0)
-        no_points = sp.csr_matrix((0, n_dof))
-        return Contact(no_points, empty, empty, np.empty((0, 3)), np.empty((0, 3)), (), np.empty(0, dtype=np.int64))
+        rows, none = np.empty((0, 3)), np.empty(0, dtype=np.int64)
+        return Contact(sp.csr_matrix((0, n_dof)), empty, empty, rows, rows, (), none, empty, empty)
     return Contact(
         sp.vstack([c.operator for c in contacts], format="csr"),
         np.concatenate([c.area for c in contacts]),
@@ -169,6 +181,8 @@ def join(contacts: tuple[Contact, ...], n_dof: int) -> Contact:
         np.concatenate([c.points for c in contacts]),
         tuple(c.names[0] for c in contacts),
         np.concatenate([np.full(c.n_point, i, dtype=np.int64) for i, c in enumerate(contacts)]),
+        np.concatenate([c.facet_size for c in contacts]),
+        np.concatenate([c.slide_limit for c in contacts]),
     )
 
 

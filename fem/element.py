@@ -74,8 +74,14 @@ class ReferenceElement:
         return self._gauss(4 if self.name in {"tet10", "tri6"} else 5)
 
     def _gauss(self, order: int) -> tuple[FloatArray, FloatArray]:
-        x, w = get_quadrature(_basis(self.name)[0].refdom, order)
-        return np.ascontiguousarray(x.T), np.ascontiguousarray(w)
+        return gauss_rule(self.name, order)
+
+
+@cache
+def gauss_rule(name: str, degree: int) -> tuple[FloatArray, FloatArray]:
+    """Points (n_point, dim) and weights of the rule that is exact to ``degree`` on the reference cell of an element."""
+    x, w = get_quadrature(_basis(name)[0].refdom, degree)
+    return np.ascontiguousarray(x.T), np.ascontiguousarray(w)
 
 
 def _irons_14() -> tuple[FloatArray, FloatArray]:

@@ -24,6 +24,7 @@ class SurfacePoints:
     points, normals : (n_point, 3) m and outward unit normals.
     area : (n_point,) m^2.
     nodes, shape : (n_point, n_local) node numbers and shape functions there.
+    facet : (n_point,) number of the facet that the point lies on.
     """
 
     points: FloatArray
@@ -31,6 +32,16 @@ class SurfacePoints:
     area: FloatArray
     nodes: IntArray
     shape: FloatArray
+    facet: IntArray
+
+    def joined(self, other: SurfacePoints) -> SurfacePoints:
+        """These points, then the others; facets of one kind."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return SurfacePoints(*(np.concatenate(pair) for pair in pairs))
+
+    def taken(self, index: IntArray) -> SurfacePoints:
+        """The points with these numbers."""
+        return SurfacePoints(*(values[index] for values in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,7 @@ class Projection:
     normals: FloatArray
     nodes: IntArray
     shape: FloatArray
+    facet: IntArray
     found: BoolArray
 
 
@@ -64,24 +76,56 @@ def surface_points(points: FloatArray, facets: IntArray) -> SurfacePoints:
         (size * w).reshape(count),
         np.repeat(facets, len(w), axis=0),
         np.tile(n, (len(facets), 1)),
+        np.repeat(np.arange(len(facets)), len(w)),
     )
 
 
-def project(points: FloatArray, targets: FloatArray, facets: IntArray, reach: float) -> Projection:
+def facet_sizes(points: FloatArray, facets: IntArray) -> FloatArray:
+    """Square roots of the facet areas, (n_facet,) m."""
+    at = surface_points(points, facets)
+    return np.sqrt(np.bincount(at.facet, at.area, len(facets)))
+
+
+def mean_size(points: FloatArray, facets: IntArray) -> float:
+    """Square root of the mean facet area, m."""
+    return float(np.sqrt(surface_points(points, facets).area.sum() / len(facets)))
+
+
+def points_on(
+    points: FloatArray, facets: IntArray, facet: IntArray, xi: FloatArray, weights: FloatArray
+) -> SurfacePoints:
+    """Points on the facets with numbers ``facet`` (n_point,) at reference coordinates xi (n_point, 2).
+
+    ``weights`` (n_point,) are areas in reference coordinates.
+    """
+    n, dn = face_element(facets).shape(xi)
+    nodes = facets[facet]
+    corner = points[nodes]
+    normal = np.cross(*np.einsum("pad,pai->dpi", dn, corner))
+    size = np.linalg.norm(normal, axis=1)
+    at = np.einsum("pa,pai->pi", n, corner)
+    return SurfacePoints(at, normal / size[:, None], size * weights, nodes, n, facet)
+
+
+def project(
+    points: FloatArray, targets: FloatArray, facets: IntArray, reach: float, *, slack: float = _EDGE_TOLERANCE
+) -> Projection:
     """Closest points of ``targets`` (n_target, 3) on facets over nodes at ``points``.
 
     Newton on (x(xi) - x_t) . dx/dxi = 0 for every facet that may come within ``reach`` (m) of a target; a projection
-    counts when xi lies in the facet and its distance is at most ``reach``. Wriggers, Computational Contact Mechanics,
-    sec. 4.1.
+    counts when xi lies in the facet and its distance is at most ``reach``; where none does, one that misses the facet by
+    less than ``slack`` in reference coordinates: a target over the kink between two facets. Wriggers, Computational
+    Contact Mechanics, sec. 4.1.
     """
     reference = face_element(facets)
     target, facet = _candidates(points[facets], targets, reach)
     local = _closest(reference, points[facets[facet]], targets[target])
     n, _ = reference.shape(local)
     distance = np.linalg.norm(np.einsum("ta,tai->ti", n, points[facets[facet]]) - targets[target], axis=1)
-    usable = np.flatnonzero(_inside(reference, local) & (distance <= reach))
+    beside = ~_inside(reference, local, _EDGE_TOLERANCE)
+    usable = np.flatnonzero((~beside | _inside(reference, local, slack)) & (distance <= reach))
     # Nearest first; of equally near facets (a shared edge) the lower number, so that the choice is reproducible.
-    order = usable[np.lexsort((facet[usable], distance[usable], target[usable]))]
+    order = usable[np.lexsort((facet[usable], distance[usable], beside[usable], target[usable]))]
     found, first = np.unique(target[order], return_index=True)
     chosen = np.zeros(len(targets), dtype=np.int64)
     xi = np.zeros((len(targets), 2))
@@ -93,7 +137,7 @@ def project(points: FloatArray, targets: FloatArray, facets: IntArray, reach: fl
     tangents = np.einsum("tad,tai->dti", dn, corner)
     normal = np.cross(tangents[0], tangents[1])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return Projection(np.einsum("ta,tai->ti", n, corner), normal, facets[chosen], n, is_found)
+    return Projection(np.einsum("ta,tai->ti", n, corner), normal, facets[chosen], n, chosen, is_found)
 
 
 def _candidates(corner: FloatArray, targets: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
@@ -123,8 +167,8 @@ def _closest(reference: ReferenceElement, corner: FloatArray, targets: FloatArra
     return xi
 
 
-def _inside(reference: ReferenceElement, xi: FloatArray) -> BoolArray:
-    low = np.all(xi >= -_EDGE_TOLERANCE, axis=1)
+def _inside(reference: ReferenceElement, xi: FloatArray, slack: float) -> BoolArray:
+    low = np.all(xi >= -slack, axis=1)
     if reference.name == "tri6":
-        return np.asarray(low & (xi.sum(axis=1) <= 1.0 + _EDGE_TOLERANCE))
-    return np.asarray(low & np.all(xi <= 1.0 + _EDGE_TOLERANCE, axis=1))
+        return np.asarray(low & (xi.sum(axis=1) <= 1.0 + slack))
+    return np.asarray(low & np.all(xi <= 1.0 + slack, axis=1))
