@@ -61,6 +61,11 @@ def face_element(facets: IntArray) -> ReferenceElement:
     return reference_element(_FACE_OF_NODES[facets.shape[1]])
 
 
+def n_corner(facets: IntArray) -> int:
+    """Number of corners of the facets, whose nodes come first."""
+    return 3 if facets.shape[1] == 6 else 4
+
+
 def surface_points(points: FloatArray, facets: IntArray) -> SurfacePoints:
     """Integration points of facets (n_facet, n_local) over nodes at ``points`` (n_node, 3)."""
     x, w = face_element(facets).mass_rule()
@@ -113,9 +118,9 @@ def project(
     """Closest points of ``targets`` (n_target, 3) on facets over nodes at ``points``.
 
     Newton on (x(xi) - x_t) . dx/dxi = 0 for every facet that may come within ``reach`` (m) of a target; a projection
-    counts when xi lies in the facet and its distance is at most ``reach``; where none does, one that misses the facet by
-    less than ``slack`` in reference coordinates: a target over the kink between two facets. Wriggers, Computational
-    Contact Mechanics, sec. 4.1.
+    counts when xi lies in the facet and its distance is at most ``reach``; where none does, one that misses the facet
+    by less than ``slack`` in reference coordinates: a target over the kink between two facets. Wriggers,
+    Computational Contact Mechanics, sec. 4.1.
     """
     reference = face_element(facets)
     target, facet = _candidates(points[facets], targets, reach)
@@ -162,7 +167,7 @@ def _closest(reference: ReferenceElement, corner: FloatArray, targets: FloatArra
         metric = np.einsum("tdi,tei->tde", tangent, tangent)
         step = np.linalg.solve(metric, np.einsum("tdi,ti->td", tangent, offset)[..., None])[..., 0]
         xi = np.clip(xi - step, -1.0, 2.0)
-        if np.abs(step).max() < 1e-13:
+        if np.abs(step).max(initial=0.0) < 1e-13:
             break
     return xi
 

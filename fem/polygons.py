@@ -8,8 +8,8 @@ from fem.arrays import FloatArray, IntArray
 from fem.compiled import compiled
 from fem.element import gauss_rule
 
-MAX_CORNERS = 48
-"""Room for the corners of a polygon: sampled edges of a facet and the cuts of a convex window."""
+MAX_CORNERS = 16
+"""Room for the corners of a polygon: those of a facet and two per side of two convex windows."""
 
 _STRAIGHT = 1e-9
 """Sine of the turn at a corner below which the corner is left out."""

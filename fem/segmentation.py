@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from fem.arrays import FloatArray, IntArray
 from fem.element import ReferenceElement
-from fem.pairing import SurfacePoints, face_element, points_on, surface_points
+from fem.pairing import SurfacePoints, face_element, n_corner, points_on, surface_points
 from fem.polygons import MAX_CORNERS, areas, clip, integration_points, straighten
 
 _WHOLE = 1e-3
@@ -31,8 +31,8 @@ def segment_points(points: FloatArray, slave: IntArray, master: IntArray, reach:
     """Integration points of the slave facets (n_facet, n_local), one rule per piece that one master facet covers.
 
     A facet inside a single master facet (matching meshes) keeps its own rule. What no master facet covers within
-    ``reach`` (m) has no points. Pieces are exact for facets with straight edges; curved ones are cut along chords of a
-    quarter edge.
+    ``reach`` (m) has no points. Edges of the master are followed by their chords in the reference coordinates of the
+    slave: exact where the slave facets are parallelograms or flat triangles and the edges straight.
     """
     pairs = _candidates(points, slave, master, reach)
     corners, counts = _pieces(points, slave, master, pairs)
@@ -85,20 +85,19 @@ def _pieces(
     corner = points[slave[pairs[0]]]
     tangents, centre = _affine_map(reference, corner)
     straight = _is_affine(points, slave) and _is_affine(points, master)
-    outline = _outline(face_element(master), 1 if straight else 4)
-    edge = np.einsum("ba,pai->pbi", face_element(master).shape(outline)[0], points[master[pairs[1]]])
-    plane = np.einsum("pdi,pbi->pbd", tangents, edge - centre[:, None]) + _centre(reference)
+    outline = points[master[pairs[1], : n_corner(master)]]
+    plane = np.einsum("pdi,pbi->pbd", tangents, outline - centre[:, None]) + _centre(reference)
     polygons = np.zeros((len(corner), MAX_CORNERS, 2))
     # Facing surfaces turn opposite ways.
-    polygons[:, : len(outline)] = plane[:, ::-1]
-    counts = np.full(len(corner), len(outline), dtype=np.int64)
+    polygons[:, : plane.shape[1]] = plane[:, ::-1]
+    counts = np.full(len(corner), plane.shape[1], dtype=np.int64)
     low, high = -_MARGIN, 1.0 + _MARGIN
     clip(polygons, counts, np.array([[low, low], [high, low], [high, high], [low, high]]))
     if not straight:
         used = np.arange(MAX_CORNERS) < counts[:, None]
         pair = np.nonzero(used)[0]
         polygons[used] = _local(reference, corner[pair], (tangents[pair], centre[pair]), polygons[used])
-    window = reference.nodes[: 3 if reference.name == "tri6" else 4]
+    window = reference.nodes[: n_corner(slave)]
     clip(polygons, counts, np.ascontiguousarray(window))
     straighten(polygons, counts)
     counts[counts < 3] = 0
@@ -116,18 +115,10 @@ def _is_affine(points: FloatArray, facets: IntArray) -> bool:
     """Whether all facets are flat parallelograms or triangles with their middle nodes in the middle."""
     reference = face_element(facets)
     corner = points[facets]
-    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2 if reference.name == "tri6" else 3]
+    a, b, c = corner[:, 0], corner[:, 1], corner[:, n_corner(facets) - 1]
     s, t = reference.nodes[:, :1], reference.nodes[:, 1:]
     plane = a[:, None] + s * (b - a)[:, None] + t * (c - a)[:, None]
     return bool(np.abs(corner - plane).max() <= 1e-9 * np.ptp(corner, axis=1).max())
-
-
-def _outline(reference: ReferenceElement, parts: int) -> FloatArray:
-    """Points around the reference facet, anticlockwise, ``parts`` intervals per edge."""
-    corner = reference.nodes[: 3 if reference.name == "tri6" else 4]
-    t = np.arange(parts)[None, :, None] / parts
-    following = np.roll(corner, -1, axis=0)
-    return np.asarray((corner[:, None] * (1.0 - t) + following[:, None] * t).reshape(-1, 2))
 
 
 def _local(
