@@ -1,4 +1,4 @@
-"""Structured blocks of quadratic hexahedra."""
+"""Structured blocks of quadratic hexahedra or tetrahedra."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ _SIDES = (
     ("z_min", 2, 0.0),
     ("z_max", 2, 1.0),
 )
+# Kuhn split of a cube with VTK corners: six tetrahedra around the diagonal 0-6; conforming between equal cubes.
+_KUHN = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 
 
 def graded(breakpoints: Sequence[float], cells: Sequence[int]) -> FloatArray:
@@ -45,23 +47,24 @@ def hex_block(
     element: str = "hex20",
     mapping: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Mesh:
-    """A block of quadratic hexahedra over the grid lines x, y, z.
+    """A block of quadratic cells over the grid lines x, y, z.
 
     Parameters
     ----------
     x, y, z : (n + 1,) increasing grid lines, m.
-    element : "hex20" (serendipity) or "hex27" (triquadratic).
+    element : "hex20" (serendipity), "hex27" (triquadratic), or "tet10": every hexahedron split into six tetrahedra.
     mapping : moves the (n_node, 3) points after the grid is laid; None keeps the box.
 
     Returns
     -------
     Mesh with the surfaces x_min, x_max, y_min, y_max, z_min, z_max.
     """
-    if element not in {"hex20", "hex27"}:
-        raise FemInputError("blocks consist of hex20 or hex27", where="block", value=element)
+    if element not in {"hex20", "hex27", "tet10"}:
+        raise FemInputError("blocks consist of hex20, hex27 or tet10", where="block", value=element)
     lines = [_with_midpoints(v) for v in (x, y, z)]
     counts = [len(v) - 1 for v in (x, y, z)]
-    offsets = np.rint(2 * reference_element(element).nodes).astype(np.int64)
+    grid = "hex27" if element == "tet10" else element
+    offsets = np.rint(2 * reference_element(grid).nodes).astype(np.int64)
     cell = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 1, 3)
     lattice = 2 * cell + offsets[None, :, :]
     shape = tuple(len(v) for v in lines)
@@ -70,9 +73,12 @@ def hex_block(
     ijk = np.unravel_index(used, shape)
     points = np.stack([line[i] for line, i in zip(lines, ijk, strict=True)], axis=1)
     cells = cells.reshape(flat.shape).astype(np.int64)
+    moved = np.ascontiguousarray(points if mapping is None else mapping(points))
+    if element == "tet10":
+        cells = cells[:, _tetrahedra()].reshape(-1, 10)
+        return Mesh(moved, cells, element, _plane_sides(Mesh(points, cells, element, {})))
     surfaces = {name: _side(cells, cell[:, 0, :], counts, element, axis, end) for name, axis, end in _SIDES}
-    moved = points if mapping is None else mapping(points)
-    return Mesh(np.ascontiguousarray(moved), cells, element, surfaces)
+    return Mesh(moved, cells, element, surfaces)
 
 
 def arch(points: FloatArray, rise: float, span: float) -> FloatArray:
@@ -89,6 +95,22 @@ def _with_midpoints(v: FloatArray) -> FloatArray:
     line = np.empty(2 * len(v) - 1)
     line[::2], line[1::2] = v, 0.5 * (v[1:] + v[:-1])
     return line
+
+
+def _tetrahedra() -> IntArray:
+    """Local nodes of HEX27 that make up each of the six TET10, (6, 10)."""
+    nodes, edges = reference_element("hex27").nodes, reference_element("tet10").edges
+    corners = nodes[np.array(_KUHN)]
+    places = np.concatenate([corners, corners[:, edges[:, :2]].mean(axis=2)], axis=1)
+    return np.asarray(np.abs(places[:, :, None] - nodes[None, None]).max(axis=3).argmin(axis=2))
+
+
+def _plane_sides(box: Mesh) -> dict[str, IntArray]:
+    """The six sides of a block before it is mapped."""
+    skin = box.skin()
+    ends = {0.0: box.points.min(axis=0), 1.0: box.points.max(axis=0)}
+    # Grid lines are copied, not computed: coordinates of a side are equal to the last bit.
+    return {name: skin[(box.points[skin][:, :, axis] == ends[end][axis]).all(axis=1)] for name, axis, end in _SIDES}
 
 
 def _side(cells: IntArray, index: IntArray, counts: list[int], element: str, axis: int, end: float) -> IntArray:

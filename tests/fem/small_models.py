@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.arrays import FloatArray, IntArray
+from fem.arrays import FloatArray
 from fem.block import graded, hex_block
 from fem.element import reference_element
 from fem.material import Material
@@ -12,9 +12,6 @@ from fem.mesh import Mesh
 from fem.model import Body, Clamp, Model, Pair, Support, build_model
 
 STEEL = Material(200e9, 0.3, 7800.0)
-_TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-# Kuhn split of a cube with VTK corners: six tetrahedra around the diagonal 0-6; conforming between equal cubes.
-_KUHN = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 
 
 def box(
@@ -22,29 +19,7 @@ def box(
 ) -> Mesh:
     """A box from the origin with ``cells`` equal intervals per axis, raised by ``shift`` m along y; also tet10."""
     lines = [graded([0.0, length], [n]) for length, n in zip(lengths, cells, strict=True)]
-    mesh = hex_block(lines[0], lines[1] + shift, lines[2], element="hex20" if element == "tet10" else element)
-    return tetrahedra(mesh) if element == "tet10" else mesh
-
-
-def tetrahedra(mesh: Mesh) -> Mesh:
-    """Six straight TET10 per hexahedron, with the surfaces of the block."""
-    corners = np.concatenate([mesh.cells[:, list(row)] for row in _KUHN])
-    used, corners = np.unique(corners, return_inverse=True)
-    corners = corners.reshape(-1, 4)
-    points = mesh.points[used]
-    pairs = np.sort(corners[:, np.array(_TET_EDGES)], axis=2).reshape(-1, 2)
-    edges, number = np.unique(pairs, axis=0, return_inverse=True)
-    cells = np.hstack([corners, len(points) + number.reshape(-1, 6)])
-    points = np.vstack([points, points[edges].mean(axis=1)])
-    plain = Mesh(points, cells, "tet10", {})
-    return Mesh(points, cells, "tet10", {name: _on(plain, name) for name in mesh.surfaces})
-
-
-def _on(mesh: Mesh, name: str) -> IntArray:
-    axis, end = "xyz".index(name[0]), name[2:]
-    value = mesh.points[:, axis].min() if end == "min" else mesh.points[:, axis].max()
-    skin = mesh.skin()
-    return np.asarray(skin[np.all(np.abs(mesh.points[skin][:, :, axis] - value) < 1e-12, axis=1)])
+    return hex_block(lines[0], lines[1] + shift, lines[2], element=element)
 
 
 def trilinear(points: FloatArray) -> FloatArray:

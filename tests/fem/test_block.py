@@ -79,8 +79,8 @@ def test_bad_grid_lines_are_refused(breakpoints: list[float], cells: list[int], 
 
 def test_blocks_of_other_elements_are_refused() -> None:
     line = np.array([0.0, 1.0])
-    with pytest.raises(FemInputError, match="tet10"):
-        hex_block(line, line, line, element="tet10")
+    with pytest.raises(FemInputError, match="hex27 or tet10; got hex8"):
+        hex_block(line, line, line, element="hex8")
 
 
 def test_unknown_surface_lists_the_known_ones() -> None:

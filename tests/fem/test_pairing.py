@@ -8,7 +8,7 @@ import pytest
 from fem.block import graded, hex_block
 from fem.mesh import Mesh
 from fem.pairing import face_element, project, surface_points
-from tests.fem.small_models import box, tetrahedra
+from tests.fem.small_models import box
 
 
 def _bulge(points: np.ndarray) -> np.ndarray:
@@ -18,8 +18,7 @@ def _bulge(points: np.ndarray) -> np.ndarray:
 
 def _curved(element: str, cells: int) -> Mesh:
     line = graded([0.0, 1.0], [cells])
-    flat = hex_block(line, graded([0.0, 1.0], [1]), line, element="hex20" if element == "tet10" else element)
-    mesh = tetrahedra(flat) if element == "tet10" else flat
+    mesh = hex_block(line, graded([0.0, 1.0], [1]), line, element=element)
     return Mesh(_bulge(mesh.points), mesh.cells, mesh.element, mesh.surfaces)
 
 
