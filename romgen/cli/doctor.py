@@ -23,7 +23,6 @@ OPTIONAL = {
     "pypardiso": "faster factorisation on x86: pip install 'romgen[fem]'",
     "gmsh": "geometry and tetrahedra: pip install 'romgen[mesh]'",
     "ziglang": "FMU binaries for five platforms: pip install 'romgen[cross]'",
-    "pyvista": "3-D pictures: pip install 'romgen[viz]'",
     "distributed": "jobs on a cluster: pip install 'romgen[cluster]'",
 }
 REQUIRED = ("numpy", "scipy", "h5py", "numba", "pydantic", "typer", "matplotlib", "jinja2", "fmpy", "pythonfmu")

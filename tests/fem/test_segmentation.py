@@ -11,7 +11,7 @@ from fem.mesh import Mesh
 from fem.pairing import project, surface_points
 from fem.polygons import MAX_CORNERS, areas, clip, integration_points, straighten
 from fem.segmentation import segment_points
-from tests.fem.small_models import box, tetrahedra
+from tests.fem.small_models import box
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -89,10 +89,7 @@ def _nodal_misfit(points: FloatArray, slave: FloatArray, master: FloatArray) -> 
 def test_uniform_pressure_meets_the_nodes_of_both_sides(element: str, cells: tuple[int, int]) -> None:
     """The patch test of the interface alone: exact for straight edges."""
     n, m = cells
-    kind = "hex20" if element == "tet10" else element
-    lower, upper = box((1.0, 1.0, 1.0), (m, 1, m), kind), box((1.0, 1.0, 1.0), (n, 1, n), kind, shift=1.0)
-    if element == "tet10":
-        lower, upper = tetrahedra(lower), tetrahedra(upper)
+    lower, upper = box((1.0, 1.0, 1.0), (m, 1, m), element), box((1.0, 1.0, 1.0), (n, 1, n), element, shift=1.0)
     assert _nodal_misfit(*_stacked(lower, upper)) < 1e-12
 
 
