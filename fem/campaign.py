@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
-from fem.errors import FemInputError
+from fem.errors import FemError, FemInputError
 from fem.modes import ModalBasis
 from fem.motion import MotionState, StepRecord
 from fem.preload import Progress, StaticState
@@ -61,7 +61,8 @@ class CampaignSegment:
     displacement, velocity : (n_time, n_sensor, n_case) m, m/s.
     energies : (n_time, 6, n_case) J: kinetic, strain, contact, relative to the equilibrium, then friction, damping,
         external work since t = 0.
-    iterations : (n_time, n_case).
+    iterations : (n_time, n_case), those of rejected steps included.
+    effort : (n_time, 3) steps of the scheme, rejected steps and refreshed factors since the output before.
     snapshots : (n_snapshot, n_dof, n_case) m from the equilibrium; snapshot_steps : (n_snapshot,).
     state : where the next segment starts.
     """
@@ -74,6 +75,7 @@ class CampaignSegment:
     velocity: FloatArray
     energies: FloatArray
     iterations: IntArray
+    effort: IntArray
     snapshots: npt.NDArray[np.float32]
     snapshot_steps: IntArray
     state: MotionState
@@ -135,10 +137,18 @@ def march_campaign(
         state = transient.start(starts.displacement, velocity, starts.slip)
         rows.append(_observe(transient.observe(state), transient, observation))
     while state.step < n_step:
-        for record in transient.march(state, min(segment_steps, n_step - state.step)):
-            rows.append(_observe(record, transient, observation))
-            state = record.state
-        yield _segment(rows, state)
+        failure = None
+        try:
+            for record in transient.march(state, min(segment_steps, n_step - state.step)):
+                rows.append(_observe(record, transient, observation))
+                state = record.resume
+        except FemError as error:
+            failure = error
+        # What a failed step leaves behind is handed on first: nothing computed is lost.
+        if rows:
+            yield _segment(rows, state)
+        if failure is not None:
+            raise failure
         rows = []
 
 
@@ -162,6 +172,7 @@ def _observe(record: StepRecord, transient: Transient, observation: Observation)
         sensors @ state.v,
         np.concatenate([record.energies - transient.rest_energies, state.work]),
         record.iterations,
+        np.array([record.effort.substeps, record.effort.rejected, record.effort.factors]),
     )
     kept = state.step % observation.stride == 0
     return _Row(state.step, fields, moved.astype(np.float32) if kept else None)
@@ -169,7 +180,7 @@ def _observe(record: StepRecord, transient: Transient, observation: Observation)
 
 def _segment(rows: list[_Row], state: MotionState) -> CampaignSegment:
     columns = [np.stack(column) for column in zip(*(row.fields for row in rows), strict=True)]
-    eta, eta_dot, eta_ddot, displacement, velocity, energies, iterations = columns
+    eta, eta_dot, eta_ddot, displacement, velocity, energies, iterations, effort = columns
     snapshots = [row.snapshot for row in rows if row.snapshot is not None]
     return CampaignSegment(
         steps=np.array([row.step for row in rows], dtype=np.int64),
@@ -180,6 +191,7 @@ def _segment(rows: list[_Row], state: MotionState) -> CampaignSegment:
         velocity=velocity,
         energies=energies,
         iterations=iterations.astype(np.int64),
+        effort=effort.astype(np.int64),
         snapshots=np.array(snapshots, dtype=np.float32).reshape(len(snapshots), *state.u.shape),
         snapshot_steps=np.array([row.step for row in rows if row.snapshot is not None], dtype=np.int64),
         state=state,

@@ -101,10 +101,15 @@ class Contact:
         """Nodal forces B' (w tau), (n_dof, n_case) N."""
         return np.asarray(self.operator.T @ (np.repeat(self.area, 3)[:, None] * traction))
 
-    def tangent(self, u: FloatArray, slip: FloatArray) -> sp.csr_matrix:
-        """Consistent tangent B' w D B at u (n_dof,), slip (n_point, 2), N/m; unsymmetric where points slip."""
+    def tangent(self, u: FloatArray, slip: FloatArray, *, symmetric: bool = False) -> sp.csr_matrix:
+        """Consistent tangent B' w D B at u (n_dof,), slip (n_point, 2), N/m; unsymmetric where points slip.
+
+        ``symmetric`` leaves out how the limit of friction follows the pressure: semidefinite, for preconditioners.
+        """
         blocks = np.empty((self.n_point, 3, 3))
         traction_tangents(self.initial_gap, self.law, self.operator @ u, slip, blocks)
+        if symmetric:
+            blocks[:, 1:, 0] = 0.0
         return self._assemble(blocks)
 
     def stick_tangent(self, status: IntArray) -> sp.csr_matrix:

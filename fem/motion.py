@@ -11,13 +11,47 @@ from fem.contact import ContactState
 
 
 @dataclass(frozen=True)
+class Pace:
+    """How the march went: what the next step size and the factor depend on, so that a restart chooses the same.
+
+    Attributes
+    ----------
+    position : time in output intervals, a dyadic fraction inside an interval.
+    level : halvings of the output interval that the next step tries first; last_level : those of the last step.
+    jerk : (n_dof, n_case) m/s^3, backward difference of the accelerations of the last step.
+    peak : (n_case,) largest mass norm of the displacement from the equilibrium so far, m kg^0.5.
+    waited : (n_case,) steps since a case got a factor of its own.
+    anchored : (n_anchor,) cases with a factor of their own; anchor_u (n_dof, n_anchor) m and anchor_slip (n_point, 2,
+        n_anchor) m: where their tangents were taken.
+    """
+
+    position: float
+    level: int
+    last_level: int
+    jerk: FloatArray
+    peak: FloatArray
+    waited: IntArray
+    anchored: IntArray
+    anchor_u: FloatArray
+    anchor_slip: FloatArray
+
+    @staticmethod
+    def beginning(u: FloatArray, slip: FloatArray, peak: FloatArray) -> Pace:
+        """At t = 0: whole output intervals, the factor of the equilibrium."""
+        n_case = u.shape[1]
+        none = np.zeros(0, dtype=np.int64)
+        waited = np.zeros(n_case, dtype=np.int64)
+        return Pace(0.0, 0, 0, np.zeros_like(u), peak, waited, none, u[:, :0].copy(), slip[:, :, :0].copy())
+
+
+@dataclass(frozen=True)
 class MotionState:
     """All that a restart needs; fields (n_dof, n_case) in SI units, u from the undeformed mesh.
 
-    ``force`` is the internal plus contact force at u, ``viscous`` the damping force of the Green-Lagrange bodies;
-    ``inertia_a``, ``damping_a``, ``inertia_v``, ``damping_v`` are M a, C a, M v, C v with C the linear part of the
-    damping; ``slip`` (n_point, 2, n_case); ``history`` the last displacements (n_kept, n_dof, n_case), newest first;
-    ``work`` (3, n_case) J: friction, damping and external work so far.
+    ``step`` is the number of the last output; ``force`` the internal plus contact force at u, ``viscous`` the damping
+    force of the Green-Lagrange bodies; ``inertia_a``, ``damping_a``, ``inertia_v``, ``damping_v`` are M a, C a, M v,
+    C v with C the linear part of the damping; ``slip`` (n_point, 2, n_case); ``history`` the last displacements
+    (n_kept, n_dof, n_case), newest first; ``work`` (3, n_case) J: friction, damping and external work so far.
     """
 
     step: int
@@ -33,21 +67,52 @@ class MotionState:
     slip: FloatArray
     history: FloatArray
     work: FloatArray
+    pace: Pace
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What the way to an output took: iterations (n_case,), steps of the scheme, rejected steps, new factors."""
+
+    iterations: IntArray
+    substeps: int = 0
+    rejected: int = 0
+    factors: int = 0
+
+    @staticmethod
+    def none(n_case: int) -> Effort:
+        """Nothing done yet."""
+        return Effort(np.zeros(n_case, dtype=np.int64))
+
+    def __add__(self, other: Effort) -> Effort:
+        return Effort(
+            self.iterations + other.iterations,
+            self.substeps + other.substeps,
+            self.rejected + other.rejected,
+            self.factors + other.factors,
+        )
 
 
 @dataclass(frozen=True)
 class StepRecord:
-    """What one step yields: the new state, its contact, energies (3, n_case) J and iterations (n_case,).
+    """What is known at one output: the state, its contact, energies (3, n_case) J and the effort since the last one.
 
-    ``energies`` are kinetic, strain and contact. ``net_force`` (n_dof, n_case) = p - f - C v at the end of the step:
-    the inertia force of the semi-discrete system there (the a of the scheme itself lags by (am - af) h).
+    ``energies`` are kinetic, strain and contact. ``net_force`` (n_dof, n_case) = p - f - C v at this time: the inertia
+    force of the semi-discrete system there (the a of the scheme itself lags by (am - af) h). ``resume`` is where to
+    march on: ``state`` itself, or the beginning of the step inside which this output lies.
     """
 
     state: MotionState
     contact: ContactState
     energies: FloatArray
     net_force: FloatArray
-    iterations: IntArray
+    effort: Effort
+    resume: MotionState
+
+    @property
+    def iterations(self) -> IntArray:
+        """Iterations since the last output, (n_case,)."""
+        return self.effort.iterations
 
 
 @dataclass(frozen=True)

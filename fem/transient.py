@@ -1,39 +1,33 @@
 """Ring-downs and forced transients by the generalised-alpha method, several cases marching together.
 
-Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375:
-
-    M a_(n+1-am) + C v_(n+1-af) + (1-af) f_(n+1) + af f_n = (1-af) p_(n+1) + af p_n
-    u_(n+1) = u_n + h v_n + h^2 ((1/2-b) a_n + b a_(n+1)),   v_(n+1) = v_n + h ((1-g) a_n + g a_(n+1))
-
-The unknown is a_(n+1). One factor of the iteration matrix at the preloaded, stuck state serves all steps and all cases
-as preconditioner inside Anderson acceleration, so that its precision never enters the answer.
+The equation of a step is in ``step_equation``; it is solved for a_(n+1) by Anderson acceleration on a frozen factor or
+by full Newton (``corrector``). A step that does not converge, or whose local error is too large, is halved; the march
+comes back to the uniform output grid by itself (``step_control``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from fem.anderson import Anderson
 from fem.arrays import FloatArray
-from fem.contact import ContactState
-from fem.corotation import NodalRotation, rotate
-from fem.errors import FemConvergenceError
+from fem.corrector import Corrector
+from fem.dynamics import Dynamics
+from fem.errors import FemConvergenceError, FemInputError
+from fem.excitation import Amplitude, TimeLoad, base_load
 from fem.generalized_alpha import Scheme
-from fem.linear_solver import LinearSolver, make_solver
 from fem.model import Model
 from fem.modes import ModalBasis, Rayleigh
-from fem.motion import MotionState, SolvedStep, StepRecord, extrapolated
+from fem.motion import Effort, MotionState, SolvedStep, StepRecord, extrapolated
+from fem.preconditioner import Preconditioner
 from fem.preload import StaticState
-from fem.sparse_product import SparseProduct
+from fem.step_control import StepControl, rescaled, too_small
+from fem.step_equation import StepEquation, StepProblem
 
-DIVERGED = 1e12
-"""Residual over the peak inertia force beyond which iterating on is pointless and overflows single precision."""
-
-Excitation = Callable[[float], FloatArray]
+METHODS = ("anderson", "newton")
 
 
 @dataclass(frozen=True)
@@ -42,15 +36,23 @@ class TransientSettings:
 
     Attributes
     ----------
-    time_step : s.
+    time_step : s, distance of the outputs and, unless halved or doubled, of the steps.
     spectral_radius : of generalised-alpha at infinite frequency.
     tolerance : residual relative to ``force_scale`` at which a step counts as solved.
-    max_iterations : per step; more raise.
+    max_iterations : per step; more halve it.
     depth : pairs kept by Anderson acceleration.
     dispersion_correction : give the first modes ``corrected_modes`` the inertia with which the scheme oscillates at
         their true frequency; the error in their frequency is then of fourth instead of second order in the step.
     corrected_modes : how many.
     solver : linear solver by name.
+    method : "anderson" on a frozen factor, or "newton" with the consistent tangent factored in every iteration.
+    refactor_above : iterations of a step above which a case gets a factor of its current tangent; 0: never. Each such
+        case keeps a factor of its own in memory.
+    max_cutbacks : most halvings of ``time_step``, for convergence or for the local error.
+    error_tolerance : local error of a step in the mass norm of the displacement, relative to the largest so far; None:
+        fixed steps.
+    max_doublings : most doublings of ``time_step`` where the local error allows; outputs inside a step are
+        interpolated.
     """
 
     time_step: float
@@ -61,6 +63,20 @@ class TransientSettings:
     dispersion_correction: bool = True
     corrected_modes: int = 2
     solver: str = "auto"
+    method: str = "anderson"
+    refactor_above: int = 15
+    max_cutbacks: int = 6
+    error_tolerance: float | None = None
+    max_doublings: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.time_step > 0.0:
+            raise FemInputError("time step must be positive", where="transient", value=self.time_step)
+        if self.method not in METHODS:
+            advice = f"choose one of {', '.join(METHODS)}"
+            raise FemInputError("unknown method", where="transient", value=self.method, advice=advice)
+        if self.error_tolerance is not None and not self.error_tolerance > 0.0:
+            raise FemInputError("error tolerance must be positive", where="transient", value=self.error_tolerance)
 
 
 class Transient:
@@ -69,6 +85,7 @@ class Transient:
     Parameters
     ----------
     force_scale : N, to which residuals are compared: peak inertia force of the intended motion.
+    loads : forces that follow a function of time, on top of the dead loads of the model.
     base_acceleration : t -> (n_case,) m/s^2 along ``base_direction``, or None.
 
     ``rest_energies`` (3, 1) J are kinetic, strain and contact energy of the equilibrium.
@@ -83,48 +100,28 @@ class Transient:
         settings: TransientSettings,
         *,
         force_scale: float,
-        base_acceleration: Excitation | None = None,
+        loads: Sequence[TimeLoad] = (),
+        base_acceleration: Amplitude | None = None,
         base_direction: str = "y",
     ) -> None:
-        self.model, self.equilibrium, self.settings = model, equilibrium, settings
+        self.model, self.equilibrium, self.settings, self.modes = model, equilibrium, settings, modes
         self.scheme = Scheme.from_radius(settings.spectral_radius)
-        self._scale = force_scale
-        self._base = base_acceleration
-        self._inertia_load = -(model.mass @ model.direction(base_direction))
-        self._mask = model.free[:, None].astype(float)
-        h, s = settings.time_step, self.scheme
-        self._beta = damping.beta
-        # What is linear in a_(n+1) acts through one matrix: mass, its damping, and the damping of the linear bodies.
-        damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
-        linear = (1.0 - s.alpha_m) * model.mass + (1.0 - s.alpha_f) * h * s.gamma * damping_matrix
-        self._mass = SparseProduct(model.mass)
-        self._damping = SparseProduct(damping_matrix)
-        self._linear = SparseProduct(linear)
-        contact = model.contact.stick_tangent(equilibrium.contact.status[:, 0])
-        viscous = damping.beta * (modes.material - model.stiffness)
-        matrix = linear + (1.0 - s.alpha_f) * h * (s.gamma * viscous + h * s.beta * (modes.stiffness + contact))
-        self._solver = self._factor(model.constrain(matrix))
-        self._gap = SparseProduct(model.contact.operator)
-        self._pull = SparseProduct(model.contact.operator.T.tocsr())
-        self._correction = self._modal_inertia(modes)
-        self._rotation = NodalRotation(model)
-        rest = equilibrium.u[:, None]
-        strain = self._forces(rest, np.zeros_like(rest), equilibrium.contact)[2]
-        stored = model.contact.stored_energy(equilibrium.contact.traction)
-        self.rest_energies = np.stack([np.zeros(1), strain, stored])
-
-    def _factor(self, matrix: sp.csr_matrix) -> LinearSolver:
-        solver = make_solver(self.settings.solver, symmetric=True, single=True)
-        solver.analyse(matrix)
-        solver.factor(matrix)
-        return solver
-
-    def _modal_inertia(self, modes: ModalBasis) -> tuple[FloatArray, FloatArray]:
-        """Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,)."""
-        count = self.settings.corrected_modes if self.settings.dispersion_correction else 0
-        h = self.settings.time_step
-        ratios = [self.scheme.frequency_corrected_inertia(float(omega), h) for omega in modes.omega[:count]]
-        return modes.left[:, :count], np.array(ratios)
+        base = () if base_acceleration is None else (base_load(model, base_direction, base_acceleration),)
+        self.dynamics = Dynamics(model, equilibrium, damping, (*loads, *base))
+        self.rest_energies = self.dynamics.rest_energies
+        self._corrected = settings.corrected_modes if settings.dispersion_correction else 0
+        self._equations: dict[int, StepEquation] = {}
+        self._corrector = Corrector(settings.tolerance, force_scale, settings.max_iterations)
+        self._control = StepControl(
+            settings.max_cutbacks,
+            self._coarsest(),
+            settings.error_tolerance,
+            settings.max_iterations,
+            settings.refactor_above if settings.method == "anderson" else 0,
+        )
+        self._preconditioner = Preconditioner(self._equation, modes, settings.solver)
+        if settings.method == "anderson":
+            self._preconditioner.rest(0)
 
     def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
         """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case).
@@ -132,157 +129,106 @@ class Transient:
         The slip history (n_point, 2, n_case) defaults to that of the equilibrium; the acceleration solves M a = p - f -
         C v.
         """
-        n_case = displacement.shape[1]
-        u = self.equilibrium.u[:, None] + displacement * self._mask
-        v = velocity * self._mask
-        if slip is None:
-            slip = np.repeat(self.equilibrium.contact.slip, n_case, axis=2)
-        contact = self.model.contact.evaluate(self._gap(u), slip)
-        force, viscous, _ = self._forces(u, v, contact)
-        damping_v = self._damping(v)
-        net = (self._load(0.0, n_case) - force - viscous - damping_v) * self._mask
-        solver = make_solver(self.settings.solver, symmetric=True)
-        mass = self.model.constrain(self.model.mass)
-        solver.analyse(mass)
-        solver.factor(mass)
-        a = solver.solve(net)
-        products = (self._mass(a), self._damping(a), self._mass(v), damping_v)
-        return MotionState(0, u, v, a, force, viscous, *products, contact.slip, u[None].copy(), np.zeros((3, n_case)))
+        return self.dynamics.start(displacement, velocity, slip, self.settings.solver)
 
     def observe(self, state: MotionState) -> StepRecord:
         """The record of a state that no step led to (t = 0)."""
-        contact = self.model.contact.evaluate(self._gap(state.u), state.slip)
+        contact = self.dynamics.contact(state.u, state.slip)
         n_case = state.u.shape[1]
-        force, viscous, strain = self._forces(state.u, state.v, contact)
-        load = self._load(state.step * self.settings.time_step, n_case)
-        net = (load - force - viscous - state.damping_v) * self._mask
-        return StepRecord(state, contact, self._energies(state, strain, contact), net, np.zeros(n_case, dtype=np.int64))
+        force, viscous, strain = self.dynamics.forces(state.u, state.v, contact)
+        load = self.dynamics.load(state.pace.position * self.settings.time_step, n_case)
+        net = (load - force - viscous - state.damping_v) * self.dynamics.mask
+        inertia_v = state.inertia_v + self._equation(state.pace.last_level).correct_inertia(state.v)
+        energies = self.dynamics.energies(inertia_v, state, strain, contact)
+        return StepRecord(state, contact, energies, net, Effort.none(n_case), state)
 
     def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
-        """Yield ``n_step`` steps from ``state``.
+        """Yield ``n_step`` outputs from ``state``, one per ``time_step``.
 
-        A step that does not converge raises ``FemConvergenceError`` with its residual history; what was yielded is
-        good.
+        A step that converges at no allowed size raises ``FemConvergenceError`` with its residual history; what was
+        yielded is good. March on from ``resume`` of the last record.
         """
-        anderson = Anderson(self.model.n_dof, state.u.shape[1], self.settings.depth)
-        for _ in range(n_step):
-            record = self._advance(state, anderson)
-            state = record.state
-            yield record
+        n_case, end = state.u.shape[1], state.step + n_step
+        anderson = Anderson(self.model.n_dof, n_case, self.settings.depth)
+        effort = Effort.none(n_case)
+        while state.step < end:
+            record, level = self._accepted(state, anderson)
+            new = record.state
+            # After a restart inside a long step its effort belongs to the outputs before.
+            effort = effort + (record.effort if state.step <= state.pace.position else Effort.none(n_case))
+            for number in range(state.step + 1, min(end, new.step) + 1):
+                at = record if number == new.pace.position else self._between(state, new, level, number)
+                yield replace(at, effort=effort)
+                effort = Effort.none(n_case)
+            state = new
 
     def precondition(self, residual: FloatArray) -> FloatArray:
         """Acceleration correction A^-1 r of the frozen factor, (n_dof, n_case) from forces (n_dof, n_case)."""
-        return self._solver.solve(residual)
+        return self._preconditioner.rest(0).solve(residual)
 
-    def _advance(self, old: MotionState, anderson: Anderson) -> StepRecord:
-        h, s = self.settings.time_step, self.scheme
-        n_case = old.u.shape[1]
-        u0 = old.u + h * old.v + h * h * (0.5 - s.beta) * old.a
-        p_old, p_new = self._load(old.step * h, n_case), self._load((old.step + 1) * h, n_case)
-        damping_v0 = old.damping_v + h * (1.0 - s.gamma) * old.damping_a
-        constant = (
-            s.alpha_m * (old.inertia_a + self._correct_inertia(old.a))
-            + (1.0 - s.alpha_f) * damping_v0
-            + s.alpha_f * (old.damping_v + old.force + old.viscous - p_old)
-            - (1.0 - s.alpha_f) * p_new
-        )
-        v0 = old.v + h * (1.0 - s.gamma) * old.a
-        solved = self._correct(u0, v0, constant, old, anderson)
-        a, contact = solved.a, solved.contact
-        inertia_a, damping_a = self._mass(a), self._damping(a)
-        new = MotionState(
-            step=old.step + 1,
-            u=u0 + h * h * s.beta * a,
-            v=v0 + h * s.gamma * a,
-            a=a,
-            force=solved.force,
-            viscous=solved.viscous,
-            inertia_a=inertia_a,
-            damping_a=damping_a,
-            inertia_v=old.inertia_v + h * ((1.0 - s.gamma) * old.inertia_a + s.gamma * inertia_a),
-            damping_v=damping_v0 + h * s.gamma * damping_a,
-            slip=contact.slip,
-            history=old.history,
-            work=old.work,
-        )
-        new = replace(
-            new,
-            history=np.concatenate([new.u[None], old.history[:2]]),
-            work=old.work + self._increment(old, new, contact, p_old, p_new),
-        )
-        net = (p_new - solved.force - solved.viscous - new.damping_v) * self._mask
-        return StepRecord(new, contact, self._energies(new, solved.strain, contact), net, solved.iterations)
+    def _coarsest(self) -> int:
+        """Negative number of doublings: none for fixed steps, and only while the corrected modes are resolved."""
+        if self.settings.error_tolerance is None:
+            return 0
+        doublings = self.settings.max_doublings
+        fastest = self.modes.omega[: self._corrected].max(initial=0.0) * self.settings.time_step
+        while doublings and fastest * 2.0**doublings > 1.0:
+            doublings -= 1
+        return -doublings
 
-    def _correct(
-        self, u0: FloatArray, v0: FloatArray, constant: FloatArray, old: MotionState, anderson: Anderson
+    def _equation(self, level: int) -> StepEquation:
+        """The equation of steps of ``time_step`` / 2^level."""
+        if level not in self._equations:
+            step = self.settings.time_step * 2.0**-level
+            self._equations[level] = StepEquation(self.dynamics, self.scheme, step, self.modes, self._corrected)
+        return self._equations[level]
+
+    def _accepted(self, state: MotionState, anderson: Anderson) -> tuple[StepRecord, int]:
+        """One step of the largest size that converges within the error tolerance, and its level."""
+        rejected, wasted = 0, np.zeros(state.u.shape[1], dtype=np.int64)
+        for level in range(state.pace.level, self._control.finest + 1):
+            equation = self._equation(level)
+            old = rescaled(state, self.dynamics, self.scheme, self.settings.time_step, level)
+            try:
+                record = self._advance(equation, old, level, anderson)
+            except FemConvergenceError as error:
+                if level == self._control.finest:
+                    raise
+                wasted = wasted + max(len(error.history) - 1, 0)
+                rejected += 1
+                continue
+            error_ratio = self._control.error(equation, old, record)
+            if error_ratio <= 1.0:
+                spent = Effort(wasted, rejected=rejected)
+                paced = self._control.paced(self.dynamics, old, record, level, error_ratio)
+                return replace(paced, effort=paced.effort + spent), level
+            wasted = wasted + record.iterations
+            rejected += 1
+        raise too_small(state, error_ratio, equation.step)
+
+    def _advance(self, equation: StepEquation, old: MotionState, level: int, anderson: Anderson) -> StepRecord:
+        n_case, h, position = old.u.shape[1], self.settings.time_step, old.pace.position
+        loads = (self.dynamics.load(position * h, n_case), self.dynamics.load((position + 2.0**-level) * h, n_case))
+        guess = extrapolated(old.history, old.v * equation.step)
+        problem = equation.problem(old, guess, loads)
+        record = equation.finish(old, problem, self._solve(equation, problem, level, old, anderson), loads)
+        jerk = (record.state.a - old.a) / equation.step
+        state = replace(record.state, pace=replace(old.pace, jerk=jerk))
+        return replace(record, state=state)
+
+    def _solve(
+        self, equation: StepEquation, problem: StepProblem, level: int, old: MotionState, anderson: Anderson
     ) -> SolvedStep:
-        """Anderson-accelerated iteration on r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0."""
-        h, s = self.settings.time_step, self.scheme
-        a = (extrapolated(old.history, old.v * h) - u0) / (h * h * s.beta)
-        iterations = np.zeros(a.shape[1], dtype=np.int64)
-        anderson.forget()
-        step = previous = None
-        w = self._rotation(u0 + h * h * s.beta * a - self.equilibrium.u[:, None])
-        history: list[float] = []
-        for _ in range(self.settings.max_iterations):
-            u = u0 + h * h * s.beta * a
-            contact = self.model.contact.evaluate(self._gap(u), old.slip)
-            force, viscous, strain = self._forces(u, v0 + h * s.gamma * a, contact)
-            inertia = self._linear(a) + (1.0 - s.alpha_m) * self._correct_inertia(a)
-            residual = (inertia + (1.0 - s.alpha_f) * (force + viscous) + constant) * self._mask
-            size = np.sqrt(np.einsum("nc,nc->c", residual, residual)) / self._scale
-            history.append(float(size.max()))
-            active = ~(size <= self.settings.tolerance)
-            if not active.any():
-                return SolvedStep(a, force, viscous, strain, contact, iterations)
-            if not history[-1] < DIVERGED:
-                break
-            correction = -rotate(w, 1.0, self.precondition(rotate(w, -1.0, residual))) * self._mask
-            if step is not None and previous is not None:
-                anderson.remember(active, step, correction - previous)
-            step = anderson.step(active, correction)
-            previous = correction
-            a = a + step
-            iterations += active
-        raise FemConvergenceError(
-            "time step does not converge",
-            where=f"step {old.step + 1}",
-            value=f"relative residual {history[-1]:.2e}",
-            advice="use a smaller time step, a smaller amplitude, or a start that has settled (snap-back)",
-            history=tuple(history),
-        )
+        if self.settings.method == "newton":
+            return self._corrector.newton(equation, problem, self.settings.solver)
+        u = problem.u0 + equation.step**2 * self.scheme.beta * problem.guess
+        solve = self._preconditioner.prepare(level, old.pace, u)
+        return self._corrector.accelerated(equation, problem, solve, anderson)
 
-    def _correct_inertia(self, a: FloatArray) -> FloatArray:
-        """The low-rank inertia of the dispersion correction, sum_j M phi_j r_j phi_j' M a."""
-        left, ratio = self._correction
-        return np.asarray(left @ (ratio[:, None] * (left.T @ a)))
-
-    def _forces(self, u: FloatArray, v: FloatArray, contact: ContactState) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Elastic plus contact force, viscous force of the Green-Lagrange bodies, strain energy."""
-        elastic, viscous, strain = self.model.body_forces(u, v, self._beta)
-        weighted = np.repeat(self.model.contact.area, 3)[:, None] * contact.traction
-        return elastic + self._pull(weighted), viscous, strain
-
-    def _load(self, t: float, n_case: int) -> FloatArray:
-        load = np.repeat(self.model.load[:, None], n_case, axis=1)
-        return load if self._base is None else load + np.outer(self._inertia_load, self._base(t))
-
-    def _energies(self, state: MotionState, strain: FloatArray, contact: ContactState) -> FloatArray:
-        # With the inertia of the dispersion correction: it makes up for what the velocities of the scheme overshoot.
-        inertia_v = state.inertia_v + self._correct_inertia(state.v)
-        kinetic = 0.5 * np.einsum("nc,nc->c", state.v, inertia_v)
-        return np.stack([kinetic, strain, self.model.contact.stored_energy(contact.traction)])
-
-    def _increment(
-        self, old: MotionState, new: MotionState, contact: ContactState, p_old: FloatArray, p_new: FloatArray
-    ) -> FloatArray:
-        """Friction, damping and external work of one step, (3, n_case) J.
-
-        The last two by the forces that the scheme itself applies, weighted with alpha_f: for a linear structure and
-        rho = 1 the ledger then closes to the tolerance of the steps.
-        """
-        af = self.scheme.alpha_f
-        damping = (1.0 - af) * (new.damping_v + new.viscous) + af * (old.damping_v + old.viscous)
-        friction = self.model.contact.dissipated(contact.traction, old.slip, contact.slip)
-        work = [np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, (1.0 - af) * p_new + af * p_old)]
-        return np.stack([friction, *work])
+    def _between(self, state: MotionState, new: MotionState, level: int, number: int) -> StepRecord:
+        """The output inside a step of several intervals, and where the march resumes: before that step."""
+        h, n_case, position = self.settings.time_step, new.u.shape[1], state.pace.position
+        old = rescaled(state, self.dynamics, self.scheme, h, level)
+        loads = (self.dynamics.load(position * h, n_case), self.dynamics.load(number * h, n_case))
+        record = self._equation(level).between(old, new, (number - position) * 2.0**level, loads)
+        return replace(record, state=replace(record.state, step=number), resume=replace(state, step=number))

@@ -1,0 +1,144 @@
+"""Two ways to solve the equation of a step: Anderson acceleration on a frozen factor, and full Newton.
+
+The first is the fast one; its factor never enters the answer. The second, with the consistent unsymmetric tangent
+factored in every iteration, is the reference that the first is tested against.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fem.anderson import Anderson
+from fem.arrays import FloatArray
+from fem.contact import ContactState
+from fem.errors import FemConvergenceError
+from fem.linear_solver import make_solver
+from fem.motion import SolvedStep
+from fem.step_equation import StepEquation, StepProblem, Trial
+from fem.viscous_tangent import viscous_stiffness
+
+DIVERGED = 1e12
+"""Residual over the peak inertia force beyond which iterating on is pointless and overflows single precision."""
+
+ADVICE = "use a smaller time step, a smaller amplitude, or a start that has settled (snap-back)"
+
+
+class Corrector:
+    """Solves steps to a residual of ``tolerance`` times ``scale`` N in at most ``max_iterations``."""
+
+    def __init__(self, tolerance: float, scale: float, max_iterations: int) -> None:
+        self.tolerance, self.scale, self.max_iterations = tolerance, scale, max_iterations
+
+    def size(self, residual: FloatArray) -> FloatArray:
+        """Residuals (n_dof, n_case) relative to the scale, (n_case,)."""
+        return np.asarray(np.sqrt(np.einsum("nc,nc->c", residual, residual)) / self.scale)
+
+    def failure(self, problem: StepProblem, history: list[float]) -> FemConvergenceError:
+        """The error of a step that was given up after these residuals."""
+        return FemConvergenceError(
+            "time step does not converge",
+            where=f"step {problem.number}",
+            value=f"relative residual {history[-1]:.2e}",
+            advice=ADVICE,
+            history=tuple(history),
+        )
+
+    def accelerated(
+        self,
+        equation: StepEquation,
+        problem: StepProblem,
+        solve: Callable[[FloatArray], FloatArray],
+        anderson: Anderson,
+    ) -> SolvedStep:
+        """Anderson-accelerated iteration with the preconditioner ``solve`` on all cases together."""
+        a, mask = problem.guess, equation.dynamics.mask
+        iterations = np.zeros(a.shape[1], dtype=np.int64)
+        anderson.forget()
+        step = previous = None
+        history: list[float] = []
+        for _ in range(self.max_iterations):
+            trial = equation.evaluate(a, problem)
+            size = self.size(trial.residual)
+            history.append(float(size.max()))
+            active = ~(size <= self.tolerance)
+            if not active.any():
+                return _solved(a, trial, iterations)
+            if not history[-1] < DIVERGED:
+                break
+            correction = -solve(trial.residual) * mask
+            if step is not None and previous is not None:
+                anderson.remember(active, step, correction - previous)
+            step = anderson.step(active, correction)
+            previous = correction
+            a = a + step
+            iterations += active
+        raise self.failure(problem, history)
+
+    def newton(self, equation: StepEquation, problem: StepProblem, solver: str) -> SolvedStep:
+        """Full Newton with the consistent tangent, one case after the other."""
+        n_case = problem.guess.shape[1]
+        return _joined([self._newton(equation, problem.case(c), solver) for c in range(n_case)])
+
+    def _newton(self, equation: StepEquation, problem: StepProblem, solver: str) -> SolvedStep:
+        a = problem.guess
+        history: list[float] = []
+        for iteration in range(self.max_iterations):
+            trial = equation.evaluate(a, problem)
+            history.append(float(self.size(trial.residual)[0]))
+            if history[-1] <= self.tolerance:
+                return _solved(a, trial, np.array([iteration]))
+            if not history[-1] < DIVERGED:
+                break
+            a = a - _newton_step(equation, problem, a, trial, solver) * equation.dynamics.mask
+        raise self.failure(problem, history)
+
+
+def _newton_step(equation: StepEquation, problem: StepProblem, a: FloatArray, trial: Trial, solver: str) -> FloatArray:
+    """J^-1 r with J the consistent tangent, the low-rank inertia by the formula of Woodbury."""
+    direct = make_solver(solver, symmetric=False)
+    matrix = consistent_matrix(equation, problem, a)
+    direct.analyse(matrix)
+    direct.factor(matrix)
+    left, ratio = equation.correction
+    left = left * equation.dynamics.mask
+    if not left.shape[1]:
+        return direct.solve(trial.residual)
+    solution = direct.solve(np.column_stack([trial.residual, left]))
+    plain, spread = solution[:, :1], solution[:, 1:]
+    weight = (1.0 - equation.scheme.alpha_m) * ratio[:, None]
+    small = np.eye(left.shape[1]) + weight * (left.T @ spread)
+    return np.asarray(plain - spread @ np.linalg.solve(small, weight * (left.T @ plain)))
+
+
+def consistent_matrix(equation: StepEquation, problem: StepProblem, a: FloatArray) -> sp.csr_matrix:
+    """d r / d a at a (n_dof, 1) without the low-rank inertia; unsymmetric where points slip."""
+    h, s, dynamics = equation.step, equation.scheme, equation.dynamics
+    model = dynamics.model
+    u = np.ascontiguousarray((problem.u0 + h * h * s.beta * a)[:, 0])
+    v = np.ascontiguousarray((problem.v0 + h * s.gamma * a)[:, 0])
+    stiffness = model.elastic_tangent(u) + model.contact.tangent(u, problem.slip[:, :, 0])
+    stiffness = stiffness + viscous_stiffness(model, u, v, dynamics.beta)
+    viscous = dynamics.beta * (model.elastic_tangent(u, geometric=False) - model.stiffness)
+    return equation.matrix(stiffness.tocsr(), viscous.tocsr())
+
+
+def _solved(a: FloatArray, trial: Trial, iterations: np.ndarray) -> SolvedStep:
+    return SolvedStep(a, trial.force, trial.viscous, trial.strain, trial.contact, iterations)
+
+
+def _joined(parts: list[SolvedStep]) -> SolvedStep:
+    """The cases side by side."""
+    contact = ContactState(
+        np.concatenate([p.contact.traction for p in parts], axis=1),
+        np.concatenate([p.contact.slip for p in parts], axis=2),
+        np.concatenate([p.contact.status for p in parts], axis=1),
+    )
+    columns = {
+        name: np.ascontiguousarray(np.concatenate([getattr(p, name) for p in parts], axis=-1))
+        for name in ("a", "force", "viscous", "strain", "iterations")
+    }
+    return replace(parts[0], contact=contact, **columns)

@@ -1,0 +1,96 @@
+"""Forces, energies and dissipated work of a structure in motion, whatever scheme marches it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fem.arrays import FloatArray
+from fem.contact import ContactState
+from fem.excitation import TimeLoad
+from fem.linear_solver import make_solver
+from fem.model import Model
+from fem.modes import Rayleigh
+from fem.motion import MotionState, Pace
+from fem.preload import StaticState
+from fem.sparse_product import SparseProduct
+
+
+class Dynamics:
+    """M u'' + C u' + f_viscous(u, u') + f(u, slip) = p(t), with the operators that every scheme needs.
+
+    C = alpha M + beta K_linear is the linear part of the damping; the viscous force of the Green-Lagrange bodies
+    belongs to the forces. ``rest_energies`` (3, 1) J are kinetic, strain and contact energy of the equilibrium.
+    """
+
+    def __init__(
+        self, model: Model, equilibrium: StaticState, damping: Rayleigh, loads: Sequence[TimeLoad] = ()
+    ) -> None:
+        self.model, self.equilibrium, self.loads = model, equilibrium, tuple(loads)
+        self.alpha, self.beta = damping.alpha, damping.beta
+        self.mask = model.free[:, None].astype(float)
+        self.damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
+        self.mass, self.damping = SparseProduct(model.mass), SparseProduct(self.damping_matrix)
+        self._gap = SparseProduct(model.contact.operator)
+        self._pull = SparseProduct(model.contact.operator.T.tocsr())
+        rest = equilibrium.u[:, None]
+        strain = self.forces(rest, np.zeros_like(rest), equilibrium.contact)[2]
+        stored = model.contact.stored_energy(equilibrium.contact.traction)
+        self.rest_energies = np.stack([np.zeros(1), strain, stored])
+
+    def contact(self, u: FloatArray, slip: FloatArray) -> ContactState:
+        """State of the interfaces at u (n_dof, n_case) after the history ``slip`` (n_point, 2, n_case)."""
+        return self.model.contact.evaluate(self._gap(u), slip)
+
+    def forces(self, u: FloatArray, v: FloatArray, contact: ContactState) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Elastic plus contact force, viscous force of the Green-Lagrange bodies (n_dof, n_case), strain energy."""
+        elastic, viscous, strain = self.model.body_forces(u, v, self.beta)
+        weighted = np.repeat(self.model.contact.area, 3)[:, None] * contact.traction
+        return elastic + self._pull(weighted), viscous, strain
+
+    def load(self, t: float, n_case: int) -> FloatArray:
+        """p(t) (n_dof, n_case) N: the dead loads of the model and all time functions."""
+        load = np.repeat(self.model.load[:, None], n_case, axis=1)
+        for part in self.loads:
+            load = load + np.outer(part.pattern, part.at(t, n_case))
+        return load
+
+    def start(
+        self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None, solver: str
+    ) -> MotionState:
+        """State at t = 0 for displacement from the equilibrium and velocity: M a = p - f - C v."""
+        n_case = displacement.shape[1]
+        u = self.equilibrium.u[:, None] + displacement * self.mask
+        v = velocity * self.mask
+        if slip is None:
+            slip = np.repeat(self.equilibrium.contact.slip, n_case, axis=2)
+        contact = self.contact(u, slip)
+        force, viscous, _ = self.forces(u, v, contact)
+        net = (self.load(0.0, n_case) - force - viscous - self.damping(v)) * self.mask
+        direct = make_solver(solver, symmetric=True)
+        mass = self.model.constrain(self.model.mass)
+        direct.analyse(mass)
+        direct.factor(mass)
+        return self.at_rest(u, v, direct.solve(net), (force, viscous), contact)
+
+    def at_rest(
+        self, u: FloatArray, v: FloatArray, a: FloatArray, forces: tuple[FloatArray, FloatArray], contact: ContactState
+    ) -> MotionState:
+        """The state from which a march starts at t = 0."""
+        products = (self.mass(a), self.damping(a), self.mass(v), self.damping(v))
+        pace = Pace.beginning(u, contact.slip, self.size(u))
+        work = np.zeros((3, u.shape[1]))
+        return MotionState(0, u, v, a, *forces, *products, contact.slip, u[None].copy(), work, pace)
+
+    def size(self, u: FloatArray) -> FloatArray:
+        """Mass norm of the displacement from the equilibrium, (n_case,) m kg^0.5."""
+        moved = u - self.equilibrium.u[:, None]
+        return np.asarray(np.sqrt(np.einsum("nc,nc->c", moved, self.mass(moved))))
+
+    def energies(
+        self, inertia_v: FloatArray, state: MotionState, strain: FloatArray, contact: ContactState
+    ) -> FloatArray:
+        """Kinetic, strain and contact energy, (3, n_case) J, with M v as the scheme sees it."""
+        kinetic = 0.5 * np.einsum("nc,nc->c", state.v, inertia_v)
+        return np.stack([kinetic, strain, self.model.contact.stored_energy(contact.traction)])

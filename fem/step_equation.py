@@ -1,0 +1,198 @@
+"""The equation of one generalised-alpha step of a given size, and the motion that its solution gives.
+
+Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375:
+
+    M a_(n+1-am) + C v_(n+1-af) + (1-af) f_(n+1) + af f_n = (1-af) p_(n+1) + af p_n
+    u_(n+1) = u_n + h v_n + h^2 ((1/2-b) a_n + b a_(n+1)),   v_(n+1) = v_n + h ((1-g) a_n + g a_(n+1))
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fem.arrays import FloatArray
+from fem.contact import ContactState
+from fem.dynamics import Dynamics
+from fem.generalized_alpha import Scheme
+from fem.modes import ModalBasis
+from fem.motion import Effort, MotionState, SolvedStep, StepRecord
+from fem.sparse_product import SparseProduct
+
+
+@dataclass(frozen=True)
+class StepProblem:
+    """r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0 for the a at the end of the step.
+
+    Fields (n_dof, n_case); ``slip`` (n_point, 2, n_case) at the beginning; ``guess`` the a to start from; ``number``
+    of the output that the step leads to.
+    """
+
+    u0: FloatArray
+    v0: FloatArray
+    constant: FloatArray
+    slip: FloatArray
+    guess: FloatArray
+    number: int
+
+    def case(self, c: int) -> StepProblem:
+        """The problem of one case alone."""
+        u0, v0, constant, guess = (
+            np.ascontiguousarray(x[:, c : c + 1]) for x in (self.u0, self.v0, self.constant, self.guess)
+        )
+        return StepProblem(u0, v0, constant, np.ascontiguousarray(self.slip[:, :, c : c + 1]), guess, self.number)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Forces, strain energy, contact and residual (n_dof, n_case) N at one a."""
+
+    u: FloatArray
+    force: FloatArray
+    viscous: FloatArray
+    strain: FloatArray
+    contact: ContactState
+    residual: FloatArray
+
+
+class StepEquation:
+    """The discrete equation for steps of ``step`` s.
+
+    Parameters
+    ----------
+    corrected : number of modes that get the inertia with which the scheme oscillates at their true frequency.
+    """
+
+    def __init__(self, dynamics: Dynamics, scheme: Scheme, step: float, modes: ModalBasis, corrected: int) -> None:
+        self.dynamics, self.scheme, self.step = dynamics, scheme, step
+        # What is linear in a_(n+1) acts through one matrix: mass, its damping, and the damping of the linear bodies.
+        self._linear = (1.0 - scheme.alpha_m) * dynamics.model.mass + (
+            1.0 - scheme.alpha_f
+        ) * step * scheme.gamma * dynamics.damping_matrix
+        self._product = SparseProduct(self._linear)
+        ratios = [scheme.frequency_corrected_inertia(float(omega), step) for omega in modes.omega[:corrected]]
+        # Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,).
+        self.correction = modes.left[:, :corrected], np.array(ratios)
+
+    def matrix(self, stiffness: sp.csr_matrix, viscous: sp.csr_matrix) -> sp.csr_matrix:
+        """d r / d a without the low-rank inertia, from d f / d u and d f / d v in N/m and N s/m, constrained."""
+        h, s = self.step, self.scheme
+        return self.dynamics.model.constrain(
+            self._linear + (1.0 - s.alpha_f) * h * (s.gamma * viscous + h * s.beta * stiffness)
+        )
+
+    def correct_inertia(self, a: FloatArray) -> FloatArray:
+        """The low-rank inertia of the dispersion correction, sum_j M phi_j r_j phi_j' M a."""
+        left, ratio = self.correction
+        return np.asarray(left @ (ratio[:, None] * (left.T @ a)))
+
+    def problem(self, old: MotionState, guess: FloatArray, loads: tuple[FloatArray, FloatArray]) -> StepProblem:
+        """What is known at the beginning; ``guess`` a displacement, ``loads`` p at both ends (n_dof, n_case) N."""
+        h, s, (p_old, p_new) = self.step, self.scheme, loads
+        u0 = old.u + h * old.v + h * h * (0.5 - s.beta) * old.a
+        damping_v0 = old.damping_v + h * (1.0 - s.gamma) * old.damping_a
+        constant = (
+            s.alpha_m * (old.inertia_a + self.correct_inertia(old.a))
+            + (1.0 - s.alpha_f) * damping_v0
+            + s.alpha_f * (old.damping_v + old.force + old.viscous - p_old)
+            - (1.0 - s.alpha_f) * p_new
+        )
+        v0 = old.v + h * (1.0 - s.gamma) * old.a
+        return StepProblem(u0, v0, constant, old.slip, (guess - u0) / (h * h * s.beta), old.step + 1)
+
+    def evaluate(self, a: FloatArray, problem: StepProblem) -> Trial:
+        """Residual of the equation at a (n_dof, n_case) m/s^2."""
+        h, s, dynamics = self.step, self.scheme, self.dynamics
+        u = problem.u0 + h * h * s.beta * a
+        contact = dynamics.contact(u, problem.slip)
+        force, viscous, strain = dynamics.forces(u, problem.v0 + h * s.gamma * a, contact)
+        inertia = self._product(a) + (1.0 - s.alpha_m) * self.correct_inertia(a)
+        residual = (inertia + (1.0 - s.alpha_f) * (force + viscous) + problem.constant) * dynamics.mask
+        return Trial(u, force, viscous, strain, contact, residual)
+
+    def finish(
+        self, old: MotionState, problem: StepProblem, solved: SolvedStep, loads: tuple[FloatArray, FloatArray]
+    ) -> StepRecord:
+        """The record at the end of the step; the pace of the state is still that of its beginning."""
+        h, s, dynamics = self.step, self.scheme, self.dynamics
+        a = solved.a
+        inertia_a, damping_a = dynamics.mass(a), dynamics.damping(a)
+        damping_v0 = old.damping_v + h * (1.0 - s.gamma) * old.damping_a
+        u = problem.u0 + h * h * s.beta * a
+        new = replace(
+            old,
+            u=u,
+            v=problem.v0 + h * s.gamma * a,
+            a=a,
+            force=solved.force,
+            viscous=solved.viscous,
+            inertia_a=inertia_a,
+            damping_a=damping_a,
+            inertia_v=old.inertia_v + h * ((1.0 - s.gamma) * old.inertia_a + s.gamma * inertia_a),
+            damping_v=damping_v0 + h * s.gamma * damping_a,
+            slip=solved.contact.slip,
+            history=np.concatenate([u[None], old.history[:2]]),
+        )
+        return self._record(old, new, (solved.strain, solved.contact), loads, Effort(solved.iterations, substeps=1))
+
+    def between(
+        self, old: MotionState, new: MotionState, share: float, loads: tuple[FloatArray, FloatArray]
+    ) -> StepRecord:
+        """The record inside a step, at the ``share`` of it, by the scheme's own formulas with a that varies linearly.
+
+        u = u_n + s h v_n + s^2 h^2 (a_n/2 + b s (a_(n+1) - a_n)), v = v_n + s h (a_n + g s (a_(n+1) - a_n)): the exact
+        end values at s = 1; in between of third order in h, like one step. ``loads`` at the beginning and here.
+        """
+        h, s, dynamics = share * self.step, self.scheme, self.dynamics
+        rise = share * (new.a - old.a)
+        u = old.u + h * old.v + h * h * (0.5 * old.a + s.beta * rise)
+        v = old.v + h * (old.a + s.gamma * rise)
+        a = old.a + rise
+        contact = dynamics.contact(u, old.slip)
+        force, viscous, strain = dynamics.forces(u, v, contact)
+        mid = replace(
+            old,
+            u=u,
+            v=v,
+            a=a,
+            force=force,
+            viscous=viscous,
+            inertia_a=dynamics.mass(a),
+            damping_a=dynamics.damping(a),
+            inertia_v=dynamics.mass(v),
+            damping_v=dynamics.damping(v),
+            slip=contact.slip,
+        )
+        return self._record(old, mid, (strain, contact), loads, Effort.none(u.shape[1]))
+
+    def _record(
+        self,
+        old: MotionState,
+        new: MotionState,
+        found: tuple[FloatArray, ContactState],
+        loads: tuple[FloatArray, FloatArray],
+        effort: Effort,
+    ) -> StepRecord:
+        strain, contact = found
+        new = replace(new, work=old.work + self._increment(old, new, contact, loads))
+        # With the inertia of the dispersion correction: it makes up for what the velocities of the scheme overshoot.
+        inertia_v = new.inertia_v + self.correct_inertia(new.v)
+        energies = self.dynamics.energies(inertia_v, new, strain, contact)
+        net = (loads[1] - new.force - new.viscous - new.damping_v) * self.dynamics.mask
+        return StepRecord(new, contact, energies, net, effort, new)
+
+    def _increment(
+        self, old: MotionState, new: MotionState, contact: ContactState, loads: tuple[FloatArray, FloatArray]
+    ) -> FloatArray:
+        """Friction, damping and external work of one step, (3, n_case) J.
+
+        The last two by the forces that the scheme itself applies, weighted with alpha_f: for a linear structure and
+        rho = 1 the ledger then closes to the tolerance of the steps.
+        """
+        af, (p_old, p_new) = self.scheme.alpha_f, loads
+        damping = (1.0 - af) * (new.damping_v + new.viscous) + af * (old.damping_v + old.viscous)
+        friction = self.dynamics.model.contact.dissipated(contact.traction, old.slip, contact.slip)
+        work = [np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, (1.0 - af) * p_new + af * p_old)]
+        return np.stack([friction, *work])
