@@ -20,7 +20,8 @@ class Pace:
     level : halvings of the output interval that the next step tries first; last_level : those of the last step.
     jerk : (n_dof, n_case) m/s^3, backward difference of the accelerations of the last step.
     peak : (n_case,) largest mass norm of the displacement from the equilibrium so far, m kg^0.5.
-    waited : (n_case,) steps since a case got a factor of its own.
+    waited, patience : (n_case,) steps since a case got a factor of its own, and steps to wait for the next one.
+    before : (n_case,) iterations of the step for which it got it.
     anchored : (n_anchor,) cases with a factor of their own; anchor_u (n_dof, n_anchor) m and anchor_slip (n_point, 2,
         n_anchor) m: where their tangents were taken.
     """
@@ -31,6 +32,8 @@ class Pace:
     jerk: FloatArray
     peak: FloatArray
     waited: IntArray
+    patience: IntArray
+    before: IntArray
     anchored: IntArray
     anchor_u: FloatArray
     anchor_slip: FloatArray
@@ -38,10 +41,10 @@ class Pace:
     @staticmethod
     def beginning(u: FloatArray, slip: FloatArray, peak: FloatArray) -> Pace:
         """At t = 0: whole output intervals, the factor of the equilibrium."""
-        n_case = u.shape[1]
-        none = np.zeros(0, dtype=np.int64)
-        waited = np.zeros(n_case, dtype=np.int64)
-        return Pace(0.0, 0, 0, np.zeros_like(u), peak, waited, none, u[:, :0].copy(), slip[:, :, :0].copy())
+        zero = np.zeros(u.shape[1], dtype=np.int64)
+        none = zero[:0]
+        still = np.zeros_like(u)
+        return Pace(0.0, 0, 0, still, peak, zero, zero, zero, none, u[:, :0].copy(), slip[:, :, :0].copy())
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.arrays import FloatArray
+from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError
 from fem.generalized_alpha import Scheme
@@ -20,7 +20,10 @@ EASY = 3
 """A step is easy, and the next one may be longer, up to the largest number of iterations over this."""
 
 REFRESH_WAIT = 10
-"""Steps that a case keeps a factor of its own at least: a new one costs as much as some 40 iterations."""
+"""Steps that a factor of its own must serve a case to have paid: it costs as much as some 40 iterations."""
+
+WORTH = 0.8
+"""Share of the iterations for which a factor was made that a step with it may take for the factor to stay."""
 
 
 @dataclass(frozen=True)
@@ -70,32 +73,58 @@ class StepControl:
         position = old.pace.position + 2.0**-level
         peak = old.pace.peak if self.error_tolerance is None else np.maximum(old.pace.peak, dynamics.size(new.u))
         pace = replace(
-            old.pace,
+            new.pace,
             position=position,
             level=self.next_level(level, position, error, int(iterations.max())),
             last_level=level,
             peak=peak,
             waited=old.pace.waited + 1,
         )
-        slow = (iterations > self.refactor_above) & (pace.waited >= REFRESH_WAIT)
-        count = 0
-        if self.refactor_above and slow.any():
-            pace, count = _anchored(pace, slow, new.u, old.slip), int(slow.sum())
+        pace, count = self._refreshed(pace, iterations, new.u, old.slip)
         state = replace(new, step=int(np.floor(position)), pace=pace)
         effort = replace(record.effort, factors=record.effort.factors + count)
         return replace(record, state=state, resume=state, effort=effort)
 
+    def _refreshed(self, pace: Pace, iterations: IntArray, u: FloatArray, slip: FloatArray) -> tuple[Pace, int]:
+        """The pace with new factors for slow cases, without those that did not pay, and the number of new ones.
 
-def _anchored(pace: Pace, slow: np.ndarray, u: FloatArray, slip: FloatArray) -> Pace:
-    """The pace with a factor of their own for the slow cases, at u and the slip history of the step just done."""
-    keep = [i for i, case in enumerate(pace.anchored) if not slow[case]]
-    cases = np.flatnonzero(slow)
+        A factor that saves less than a fifth of the iterations for which it was made is dropped for the shared one. If
+        that comes before ``REFRESH_WAIT`` steps it has not paid, and the case waits twice as long for the next.
+        """
+        if not self.refactor_above:
+            return pace, 0
+        stale = np.isin(np.arange(len(iterations)), pace.anchored) & (iterations > WORTH * pace.before)
+        lost = np.maximum(2 * pace.patience, REFRESH_WAIT)
+        patience = np.where(stale, np.where(pace.waited < REFRESH_WAIT, lost, 0), pace.patience)
+        waited = np.where(stale, 0, pace.waited)
+        pace = _dropped(replace(pace, patience=patience, waited=waited), stale)
+        slow = (iterations > self.refactor_above) & (pace.waited >= pace.patience)
+        if not slow.any():
+            return pace, 0
+        pace = replace(pace, before=np.where(slow, iterations, pace.before))
+        return _anchored(pace, slow, u, slip), int(slow.sum())
+
+
+def _dropped(pace: Pace, gone: BoolArray) -> Pace:
+    """The pace without the factors of some cases."""
+    keep = [i for i, case in enumerate(pace.anchored) if not gone[case]]
     return replace(
         pace,
+        anchored=pace.anchored[keep],
+        anchor_u=pace.anchor_u[:, keep],
+        anchor_slip=pace.anchor_slip[:, :, keep],
+    )
+
+
+def _anchored(pace: Pace, slow: BoolArray, u: FloatArray, slip: FloatArray) -> Pace:
+    """The pace with a factor of their own for the slow cases, at u and the slip history of the step just done."""
+    cases, kept = np.flatnonzero(slow), _dropped(pace, slow)
+    return replace(
+        kept,
         waited=np.where(slow, 0, pace.waited),
-        anchored=np.concatenate([pace.anchored[keep], cases]).astype(np.int64),
-        anchor_u=np.concatenate([pace.anchor_u[:, keep], u[:, cases]], axis=1),
-        anchor_slip=np.concatenate([pace.anchor_slip[:, :, keep], slip[:, :, cases]], axis=2),
+        anchored=np.concatenate([kept.anchored, cases]).astype(np.int64),
+        anchor_u=np.concatenate([kept.anchor_u, u[:, cases]], axis=1),
+        anchor_slip=np.concatenate([kept.anchor_slip, slip[:, :, cases]], axis=2),
     )
 
 

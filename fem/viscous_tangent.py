@@ -62,9 +62,7 @@ def viscous_tangents(
 
 
 @inlined
-def _fields(
-    u: FloatArray, v: FloatArray, nodes: IntArray, gradients: FloatArray, F: FloatArray, D: FloatArray
-) -> None:
+def _fields(u: FloatArray, v: FloatArray, nodes: IntArray, gradients: FloatArray, F: FloatArray, D: FloatArray) -> None:
     """F = I + grad u and D = grad v of one cell at one point."""
     for i in range(3):
         for j in range(3):
