@@ -1,4 +1,4 @@
-"""Loads that follow any function of time: at points, on surfaces, and by accelerating the base."""
+"""Loads that follow any function of time: the dead loads of ``loads``, any nodal pattern, and a moving base."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 
 from fem.arrays import FloatArray
 from fem.errors import FemInputError
+from fem.loads import Assembly, Load, load_vector
 from fem.model import AXES, Model
-from fem.pairing import surface_points
-from fem.sensor import Sensor, sensor_rows
 
 Amplitude = Callable[[float], FloatArray | float]
 """t in s -> one value for all cases or (n_case,) values."""
@@ -41,34 +40,10 @@ class TimeLoad:
         return np.broadcast_to(value, (n_case,))
 
 
-def point_load(
-    model: Model, point: tuple[float, float, float], direction: str, amplitude: Amplitude, *, name: str = "point load"
-) -> TimeLoad:
-    """A force of ``amplitude`` N at a material point: by its shape functions, as a sensor reads a displacement."""
-    row = sensor_rows(model, [Sensor(name, point, direction)])[0]
-    return TimeLoad(name, row * model.free, amplitude)
-
-
-def surface_load(
-    model: Model, surface: str, direction: str, amplitude: Amplitude, *, name: str = "surface load"
-) -> TimeLoad:
-    """A uniform dead traction on surface "<body>.<surface>" that sums to ``amplitude`` N along ``direction``.
-
-    ``direction`` is "x", "y", "z", or "normal" for a pressure: positive amplitudes then press against the surface and
-    ``amplitude`` is pressure times area.
-    """
-    at = surface_points(model.points, model.facets(surface))
-    if direction == "normal":
-        axis = -at.normals
-    elif direction in AXES:
-        axis = np.tile(np.eye(3)[AXES[direction]], (len(at.area), 1))
-    else:
-        advice = "choose x, y, z or normal"
-        raise FemInputError("unknown direction", where=name, value=direction, advice=advice)
-    density = at.area[:, None] / at.area.sum() * axis
-    pattern = np.zeros((len(model.points), 3))
-    np.add.at(pattern, at.nodes, at.shape[:, :, None] * density[:, None, :])
-    return TimeLoad(name, pattern.ravel() * model.free, amplitude)
+def time_load(model: Model, load: Load, amplitude: Amplitude) -> TimeLoad:
+    """A force, traction, pressure or gravity of ``loads`` times a function of time."""
+    assembly = Assembly(model.bodies, model.offsets, model.points, model.mass)
+    return TimeLoad(load.name, load_vector(load, assembly), amplitude)
 
 
 def base_load(model: Model, direction: str, acceleration: Amplitude) -> TimeLoad:
