@@ -15,6 +15,9 @@ from fem.model import Model
 from fem.preload import StaticState
 from fem.rigid_motion import check_restraint
 
+_RIGID = 1e-6
+"""Eigenvalues above minus this share of the shift are those of rigid motions: roundoff of a stiffness that is zero."""
+
 
 @dataclass(frozen=True)
 class ModalBasis:
@@ -48,28 +51,42 @@ class Rayleigh:
     beta: float
 
 
-def solve_modes(model: Model, state: StaticState, count: int, *, solver: str = "auto") -> ModalBasis:
-    """The lowest ``count`` modes by shift-invert Lanczos at 0.
+def rest_state(model: Model) -> StaticState:
+    """The undeformed, unloaded structure as an equilibrium to linearise about; free bodies have no other."""
+    u = np.zeros((model.n_dof, 1))
+    contact = model.contact.evaluate(model.contact.relative(u), model.contact.no_slip(1))
+    return StaticState(u[:, 0], contact, (), ())
+
+
+def solve_modes(
+    model: Model, state: StaticState, count: int, *, solver: str = "auto", shift_hz: float = 0.0
+) -> ModalBasis:
+    """The lowest ``count`` modes by shift-invert Lanczos at -(2 pi shift_hz)^2.
 
     Closed points are stuck (k_n, k_t), open points carry nothing. The shift at 0 needs stiffness: a body that nothing
-    holds raises ``FemInputError``, an unstable equilibrium ``FemConvergenceError``.
+    holds raises ``FemInputError``, an unstable equilibrium ``FemConvergenceError``. With a positive shift, of the order
+    of the lowest elastic frequency, free bodies are allowed: their rigid modes come out with omega = 0 within roundoff.
     """
-    check_restraint(model)
+    if shift_hz == 0.0:
+        check_restraint(model)
     elastic = model.elastic_tangent(state.u)
     tangent = model.constrain(elastic + model.contact.stick_tangent(state.contact.status[:, 0]))
-    direct = make_solver(solver, symmetric=True)
-    direct.analyse(tangent)
-    direct.factor(tangent)
     keep = sp.diags(model.free.astype(float))
     mass = (keep @ model.mass @ keep).tocsr()
+    sigma = -((2.0 * np.pi * shift_hz) ** 2)
+    shifted = tangent if sigma == 0.0 else (tangent - sigma * mass).tocsr()
+    direct = make_solver(solver, symmetric=True)
+    direct.analyse(shifted)
+    direct.factor(shifted)
     operator = spla.LinearOperator(tangent.shape, matvec=direct.solve, dtype=np.float64)
     # Supported rows have stiffness 1 and mass 0: infinite eigenvalues, which shift-invert never meets.
     start = np.where(model.free, np.sin(1.0 + np.arange(model.n_dof)), 0.0)
-    values, shapes = spla.eigsh(tangent, count, mass, sigma=0.0, OPinv=operator, v0=start)
-    if np.any(values <= 0.0):
+    values, shapes = spla.eigsh(tangent, count, mass, sigma=sigma, OPinv=operator, v0=start)
+    if np.any(values <= -_RIGID * abs(sigma)):
         raise FemConvergenceError(
             "the tangent is not positive definite", where="modes", value=float(values.min()), advice="check the preload"
         )
+    values = np.maximum(values, 0.0)
     order = np.argsort(values)
     shapes = shapes[:, order]
     shapes /= np.sqrt(np.einsum("nm,nm->m", shapes, mass @ shapes))

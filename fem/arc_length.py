@@ -1,0 +1,232 @@
+"""Static equilibrium paths through limit points: arc-length continuation in displacement and load factor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.arrays import FloatArray
+from fem.contact import ContactState
+from fem.errors import FemConvergenceError
+from fem.linear_solver import make_solver
+from fem.model import Model
+from fem.modes import rest_state
+from fem.preload import StaticState
+from fem.rigid_motion import check_restraint
+
+_GROW, _SHRINK = 1.5, 0.5
+_EASY, _HARD = 4, 7
+"""A step that needed fewer iterations than _EASY lets the next one grow, more than _HARD makes it shrink."""
+
+
+@dataclass(frozen=True)
+class PathSettings:
+    """First and largest arc length in load factor units (1 is the full load), tolerance, iterations, steps, solver.
+
+    The arc length of a step is sqrt((du/u_1)^2 + dlambda^2) with u_1 the length of the linear answer to the full load.
+    """
+
+    step: float = 0.1
+    largest_step: float = 0.3
+    smallest_step: float = 1e-6
+    tolerance: float = 1e-8
+    max_iterations: int = 12
+    max_steps: int = 200
+    solver: str = "auto"
+
+
+@dataclass(frozen=True)
+class EquilibriumPath:
+    """Equilibria f_int(u) + f_contact(u) = lambda p along a path.
+
+    Attributes
+    ----------
+    load_factors : (n_point,) lambda; displacements : (n_point, n_dof) m.
+    rates : (n_point,) d lambda/ds along the arc; it changes sign at a limit point.
+    limit_points : (n_limit,) indices of the points that are limit points, located to ``tolerance``.
+    states : the equilibria with their contact history.
+    """
+
+    load_factors: FloatArray
+    displacements: FloatArray
+    rates: FloatArray
+    limit_points: tuple[int, ...]
+    states: tuple[StaticState, ...]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A converged point and the unit tangent (du, dlambda) there."""
+
+    u: FloatArray
+    factor: float
+    contact: ContactState
+    du: FloatArray
+    dfactor: float
+
+
+def follow_path(
+    model: Model,
+    load: FloatArray,
+    settings: PathSettings | None = None,
+    *,
+    start: StaticState | None = None,
+    stop: Callable[[FloatArray, float], bool] | None = None,
+) -> EquilibriumPath:
+    """Follow the equilibria from load factor 0 through limit points, with snap-through and snap-back.
+
+    Predictor along the tangent, corrector by Newton on the plane through the prediction across the tangent, bordered
+    elimination with one factor per iteration, step length by the number of iterations. Limit points are located by the
+    secant method on d lambda/ds and belong to the path.
+
+    Parameters
+    ----------
+    load : p, (n_dof,) N.
+    start : equilibrium at load factor 0; none: the undeformed state.
+    stop : from u (n_dof,) and lambda; the path ends at the first point where it is True. None: at lambda >= 1.
+
+    Raises
+    ------
+    FemConvergenceError : no step of the smallest length converges, or ``max_steps`` without ``stop``; the points so far
+        are in ``last_good`` of the error, an ``EquilibriumPath``.
+
+    Source: Riks, Int. J. Solids Struct. 15 (1979) 529-551.
+    """
+    check_restraint(model)
+    settings = settings or PathSettings()
+    finished = stop if stop is not None else (lambda _, factor: factor >= 1.0)
+    state = start if start is not None else rest_state(model)
+    path = _Path(model, load, settings)
+    here = path.first(state)
+    points, limits, length = [here], [], settings.step
+    for _ in range(settings.max_steps):
+        there, iterations, length = path.advance(here, length, points)
+        if here.dfactor * there.dfactor < 0.0:
+            limit = path.limit_between(here, there)
+            limits.append(len(points))
+            points.append(limit)
+        points.append(there)
+        here = there
+        if finished(here.u, here.factor):
+            return _record(points, limits)
+        if iterations < _EASY:
+            length = min(_GROW * length, settings.largest_step)
+        elif iterations > _HARD:
+            length *= _SHRINK
+    error = FemConvergenceError(
+        "the path did not reach its end",
+        where="arc length",
+        value=f"load factor {here.factor:.6g} after {settings.max_steps} steps",
+        advice="allow more or larger steps, or stop earlier",
+    )
+    error.last_good = _record(points, limits)
+    raise error
+
+
+def _record(points: list[_Point], limits: list[int]) -> EquilibriumPath:
+    return EquilibriumPath(
+        np.array([p.factor for p in points]),
+        np.array([p.u for p in points]),
+        np.array([p.dfactor for p in points]),
+        tuple(limits),
+        tuple(StaticState(p.u, p.contact, (p.factor,), ()) for p in points),
+    )
+
+
+class _Path:
+    """The equations of one path and their linear algebra; ``scale`` is u_1, the length of the linear answer."""
+
+    def __init__(self, model: Model, load: FloatArray, settings: PathSettings) -> None:
+        self._model, self._settings = model, settings
+        self._load = np.where(model.free, load, 0.0)
+        self._size = float(np.linalg.norm(self._load))
+        if not (np.isfinite(self._size) and self._size > 0.0):
+            raise FemConvergenceError("the load has no finite, positive size", where="arc length", value=self._size)
+        self._scale = 1.0
+
+    def first(self, state: StaticState) -> _Point:
+        """The start with its tangent towards a growing load; sets the length scale of the path."""
+        answer = self._solve(state.u, state.contact.slip, [self._load])[0]
+        self._scale = float(np.linalg.norm(answer))
+        return _Point(state.u, 0.0, state.contact, *self._unit(answer, 1.0))
+
+    def advance(self, here: _Point, length: float, points: list[_Point]) -> tuple[_Point, int, float]:
+        """The next point, its iterations and the step length that led there, halved until the corrector converges."""
+        while length >= self._settings.smallest_step:
+            found = self.step(here, length)
+            if found is not None:
+                return *found, length
+            length *= _SHRINK
+        error = FemConvergenceError(
+            "no step along the path converges",
+            where="arc length",
+            value=f"load factor {here.factor:.6g}",
+            advice="check for a bifurcation or for loose parts here",
+        )
+        error.last_good = _record(points, [])
+        raise error
+
+    def step(self, here: _Point, length: float) -> tuple[_Point, int] | None:
+        """One step of given arc length; None where the corrector does not converge."""
+        model, slip = self._model, here.contact.slip
+        u, factor = here.u + length * here.du, here.factor + length * here.dfactor
+        for iteration in range(self._settings.max_iterations):
+            contact = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
+            force = model.elastic_force(u[:, None])[0] + model.contact.force(contact.traction)
+            residual = np.where(model.free, factor * self._load - force[:, 0], 0.0)
+            size = float(np.linalg.norm(residual))
+            if not np.isfinite(size):
+                return None
+            to_residual, to_load = self._solve(u, slip, [residual, self._load])
+            if iteration > 0 and size <= self._settings.tolerance * self._size:
+                du, dfactor = self._unit(to_load, 1.0)
+                sign = 1.0 if self._dot(du, dfactor, here.du, here.dfactor) >= 0.0 else -1.0
+                return _Point(u, factor, contact, sign * du, sign * dfactor), iteration
+            # Stay on the plane across the tangent: du . du_0 / u_1^2 + dlambda dlambda_0 = 0.
+            across = here.du @ to_load / self._scale**2 + here.dfactor
+            change = -float(here.du @ to_residual / self._scale**2 / across)
+            u, factor = u + to_residual + change * to_load, factor + change
+        return None
+
+    def limit_between(self, here: _Point, there: _Point) -> _Point:
+        """The point between two others where d lambda/ds = 0, by the safeguarded secant method on the arc length."""
+        low = 0.0
+        high = self._dot(there.u - here.u, there.factor - here.factor, here.du, here.dfactor)
+        rate_low, rate_high = float(here.dfactor), float(there.dfactor)
+        best = there if abs(there.dfactor) < abs(here.dfactor) else here
+        for _ in range(60):
+            margin = 0.01 * (high - low)
+            secant = low - rate_low * (high - low) / (rate_high - rate_low)
+            length = min(max(secant, low + margin), high - margin)
+            found = self.step(here, length)
+            if found is None:
+                break
+            point = found[0]
+            if abs(point.dfactor) < abs(best.dfactor):
+                best = point
+            if abs(point.dfactor) < np.sqrt(self._settings.tolerance):
+                # The load is stationary here: its error is the square of that of the place.
+                break
+            if point.dfactor * rate_low > 0.0:
+                low, rate_low = length, point.dfactor
+            else:
+                high, rate_high = length, point.dfactor
+        return best
+
+    def _solve(self, u: FloatArray, slip: FloatArray, right: list[FloatArray]) -> list[FloatArray]:
+        """Tangent answers to several loads."""
+        model = self._model
+        tangent = model.constrain(model.elastic_tangent(u) + model.contact.tangent(u, slip[:, :, 0]))
+        solver = make_solver(self._settings.solver, symmetric=False)
+        solver.analyse(tangent)
+        solver.factor(tangent)
+        return list(solver.solve(np.column_stack(right)).T)
+
+    def _unit(self, du: FloatArray, dfactor: float) -> tuple[FloatArray, float]:
+        length = float(np.sqrt(self._dot(du, dfactor, du, dfactor)))
+        return du / length, dfactor / length
+
+    def _dot(self, du: FloatArray, dfactor: float, other: FloatArray, other_factor: float) -> float:
+        return float(du @ other / self._scale**2 + dfactor * other_factor)
