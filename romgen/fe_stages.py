@@ -11,17 +11,22 @@ from fem.block import arch, graded, hex_block
 from fem.contact import ContactState
 from fem.equilibrium import interface_states
 from fem.errors import FemConvergenceError, FemError
+from fem.loads import Force as ForceOn
+from fem.loads import Load
 from fem.material import Material
-from fem.mesh import Mesh
-from fem.model import Body, Clamp, Model, Pair, Support, build_model
+from fem.mesh import Mesh, within
+from fem.modal_quantities import effective_masses, total_masses
+from fem.model import Body, Clamp, Gravity, Model, Pair, PointForce, Support, Traction, build_model
 from fem.modes import ModalBasis, Rayleigh, damping_ratios, rayleigh
 from fem.modes import solve_modes as tangent_modes
 from fem.preload import StaticSettings, StaticState, solve_static
+from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
+from fem.stress import nodal_stress
 from romgen.arrays import IntArray
 from romgen.errors import InputError, NumericalError
 from romgen.progress import Report
-from romgen.settings import BlockSettings, Study
+from romgen.settings import BlockSettings, LoadSettings, MeshSettings, Study, named_surfaces, unknown
 from romgen.structure import Interface, Modes, Preload, Structure
 
 
@@ -40,26 +45,82 @@ def translated() -> Iterator[None]:
 
 @translated()
 def build(study: Study) -> Model:
-    """Mesh the blocks of a study and assemble them with their contacts, constraints and loads."""
+    """Mesh the bodies of a study and assemble them with their contacts, constraints and loads."""
     bodies = []
-    for name, block in study.blocks.items():
-        table = study.materials[block.material]
-        material = Material(table.young_modulus, table.poisson_ratio, table.density)
-        bodies.append(Body(name, _mesh(block), material, block.kinematics))
+    for name, table in study.bodies.items():
+        values = study.materials[table.material]
+        material = Material(values.young_modulus, values.poisson_ratio, values.density)
+        bodies.append(Body(name, body_mesh(study, name), material, table.kinematics))
     pairs = [
         Pair(name, c.slave, c.master, c.friction, c.normal_penalty, c.tangential_penalty)
         for name, c in study.contacts.items()
     ]
-    supports = [Support(c.surface, tuple(c.directions)) for c in study.constraints]
-    clamps = [Clamp(load.name, load.surface, load.total_force) for load in study.loads]
-    return build_model(bodies, pairs=pairs, supports=supports, clamps=clamps)
+    supports = [Support(c.surface, tuple(c.directions), c.displacement or 0.0) for c in study.constraints]
+    loads = [_load(table) for table in study.loads]
+    return build_model(bodies, pairs=pairs, supports=supports, loads=loads)
 
 
-def _mesh(block: BlockSettings) -> Mesh:
+def _load(table: LoadSettings) -> Load:
+    surface = table.surface or ""
+    if table.total_force is not None:
+        return Clamp(table.name, surface, table.total_force)
+    if table.traction is not None:
+        return Traction(table.name, surface, table.traction)
+    if table.acceleration is not None:
+        return Gravity(table.name, table.acceleration)
+    force = table.force or (0.0, 0.0, 0.0)
+    if table.point is not None:
+        return PointForce(table.name, table.point, force)
+    return ForceOn(table.name, surface, force)
+
+
+def body_mesh(study: Study, name: str) -> Mesh:
+    """Mesh one body of a study, with its regions."""
+    table = study.bodies[name]
+    if isinstance(table, MeshSettings):
+        mesh = read_mesh(
+            table.file, group=table.group, unit=table.unit_m, raise_order=table.raise_order, mesh_size=table.mesh_size
+        )
+    else:
+        mesh = _block(table)
+    for label, region in study.regions.items():
+        if region.body == name:
+            mesh = mesh.with_region(label, within(region.x, region.y, region.z))
+    return mesh
+
+
+def _block(block: BlockSettings) -> Mesh:
     lines = [graded(*block.axis(name)) for name in ("x", "y", "z")]
     shape = block.arch
     mapping = None if shape is None else lambda points: arch(points, shape.rise, shape.span)
     return hex_block(lines[0], lines[1], lines[2], element=block.element, mapping=mapping)
+
+
+def mesh_file_problems(study: Study) -> tuple[tuple[str, ...], int]:
+    """Open the mesh files of a study; one line per problem of files, regions and names on them, and their nodes."""
+    problems: list[str] = []
+    meshes: dict[str, Mesh] = {}
+    regions = [region.body for region in study.regions.values()]
+    for name in study.bodies:
+        if name in study.meshes or name in regions:
+            try:
+                meshes[name] = body_mesh(study, name)
+            except FemError as error:
+                problems.append(f"[{'meshes' if name in study.meshes else 'regions of blocks'}.{name}] {error}")
+    contacts = [f"[contacts.{name}]" for name in study.contacts]
+    for where, named in named_surfaces(study):
+        body, _, parts = named.partition(".")
+        if body not in meshes or body not in study.meshes:
+            continue
+        mesh = meshes[body]
+        known = (*mesh.surfaces, "skin") if where.split()[0] in contacts else (*mesh.surfaces, *mesh.node_sets, "skin")
+        wanted = [parts] if where.split()[0] in contacts else parts.split("&")
+        problems += [
+            unknown(where, "surface", f"{body}.{part}", [f"{body}.{name}" for name in sorted(set(known))])
+            for part in wanted
+            if part not in known
+        ]
+    return tuple(problems), sum(len(mesh.points) for name, mesh in meshes.items() if name in study.meshes)
 
 
 def structure(study: Study) -> Structure:
@@ -67,13 +128,17 @@ def structure(study: Study) -> Structure:
     model = build(study)
     skins = [body.mesh.skin() + offset for body, offset in zip(model.bodies, model.offsets, strict=True)]
     counts = [len(body.mesh.cells) for body in model.bodies]
+    cells = np.full((sum(counts), max(body.mesh.cells.shape[1] for body in model.bodies)), -1, dtype=np.int64)
+    ends = np.cumsum(counts)
+    for body, offset, end in zip(model.bodies, model.offsets, ends, strict=True):
+        cells[end - len(body.mesh.cells) : end, : body.mesh.cells.shape[1]] = body.mesh.cells + offset
     return Structure(
         points=model.points,
-        cells=np.vstack([body.mesh.cells + offset for body, offset in zip(model.bodies, model.offsets, strict=True)]),
-        cell_type=model.bodies[0].mesh.element,
+        cells=cells,
+        cell_types=tuple(body.mesh.element for body in model.bodies),
         cell_body=np.repeat(np.arange(len(counts)), counts),
         bodies=tuple(body.name for body in model.bodies),
-        skin=_triangles(np.vstack(skins)),
+        skin=np.vstack([_triangles(skin) for skin in skins]),
     )
 
 
@@ -106,7 +171,9 @@ def solve_preload(study: Study, report: Report) -> Preload:
         )
         for s in interface_states(model, state.u, state.contact)
     )
-    return Preload(state.u, interfaces, np.array(state.load_factors), np.array(state.residuals))
+    cauchy = nodal_stress(model, state.u).cauchy
+    stress = cauchy[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    return Preload(state.u, interfaces, np.array(state.load_factors), np.array(state.residuals), stress)
 
 
 def equilibrium(model: Model, preload: Preload) -> StaticState:
@@ -128,7 +195,9 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
     basis = tangent_modes(model, equilibrium(model, preload), study.modes.count)
     damping = _damping(study, basis)
     base = study.base_acceleration
-    inertia = -basis.left.T @ model.direction(base.direction) if base else np.empty((study.modes.count, 0))
+    # The whole mass matrix: the moving supports drag their neighbours along by its off-diagonal terms too.
+    whole = -basis.shapes.T @ (model.mass @ model.direction(base.direction)) if base else None
+    inertia = np.empty((study.modes.count, 0)) if whole is None else whole
     sensors = [Sensor(name, table.point, table.direction) for name, table in study.sensors.items()]
     return Modes(
         frequency_hz=basis.omega / (2.0 * np.pi),
@@ -142,6 +211,8 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
         sensor_matrix=sensor_rows(model, sensors),
         alpha=damping.alpha,
         beta=damping.beta,
+        effective_mass=effective_masses(model, basis)[:, :3],
+        total_mass=float(total_masses(model)[0]),
     )
 
 

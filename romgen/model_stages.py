@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Segment = TypeVar("Segment", bound="DataclassInstance")
 log = logging.getLogger(__name__)
 
+MODEL_TABLES = ("materials", "blocks", "meshes", "regions", "contacts", "constraints")
+
 
 @dataclass(frozen=True)
 class RingDowns:
@@ -54,7 +56,9 @@ def model_stages(study: Study) -> tuple[Stage, ...]:
     if study.data is not None:
         return (Stage("data", Recorded, (), ("data",), read_data),)
     return (
-        Stage("mesh", Structure, (), ("materials", "blocks", "contacts", "constraints"), build_mesh),
+        Stage(
+            "mesh", Structure, (), ("materials", "blocks", "meshes", "regions", "contacts", "constraints"), build_mesh
+        ),
         Stage("preload", Preload, ("mesh",), ("loads", "preload"), solve_preload),
         Stage("modes", Modes, ("preload",), ("modes", "sensors", "base_acceleration"), solve_modes),
         Stage("ringdowns", RingDowns, ("modes",), ("ringdowns", "learn.master_modes"), march_ringdowns),
@@ -134,7 +138,7 @@ def finite_elements(module: str) -> ModuleType:
         return importlib.import_module(f"romgen.{module}")
     except ImportError as error:
         raise InputError(
-            "a study with [blocks] needs the finite-element half", value=str(error), advice="pip install 'romgen[fem]'"
+            "a study with bodies needs the finite-element half", value=str(error), advice="pip install 'romgen[fem]'"
         ) from error
 
 

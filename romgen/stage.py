@@ -15,7 +15,7 @@ from romgen.errors import InputError
 from romgen.progress import Report
 from romgen.result_store import ResultStore, StageInfo
 from romgen.segments import SegmentStore
-from romgen.settings import DataSettings, Settings, Study
+from romgen.settings import DataSettings, MeshSettings, Settings, Study
 from romgen.source_digest import source_digest
 from romgen.store import SCHEMA_VERSION
 
@@ -118,6 +118,8 @@ def table_content(study: Study, table: str) -> Any:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, MeshSettings):
+        return {**value.model_dump(mode="json"), "file": _file_sha256(value.file)}
     if isinstance(value, Settings):
         return value.model_dump(mode="json")
     if isinstance(value, Mapping):
@@ -136,4 +138,4 @@ def _file_sha256(path: Path) -> str:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise InputError("cannot be read", where="[data] files", value=str(path)) from error
+        raise InputError("cannot be read", where="input file", value=str(path)) from error

@@ -18,8 +18,8 @@ class Structure:
     Attributes
     ----------
     points : (n_node, 3) m, undeformed.
-    cells : (n_cell, n_local) node numbers in VTK order.
-    cell_type : "hex20", "hex27" or "tet10".
+    cells : (n_cell, n_local) node numbers in VTK order; rows of smaller cells end in -1.
+    cell_types : "hex20", "hex27" or "tet10" of each body.
     cell_body : (n_cell,) index into ``bodies``.
     bodies : names of the bodies.
     skin : (n_triangle, 3) corner nodes of the outer surface.
@@ -27,7 +27,7 @@ class Structure:
 
     points: FloatArray = field(metadata={"unit": "m", "axes": "node,direction"})
     cells: IntArray = field(metadata={"unit": "1", "axes": "cell,local node"})
-    cell_type: str
+    cell_types: tuple[str, ...]
     cell_body: IntArray = field(metadata={"unit": "1", "axes": "cell"})
     bodies: tuple[str, ...]
     skin: IntArray = field(metadata={"unit": "1", "axes": "triangle,corner"})
@@ -73,12 +73,16 @@ class Preload:
     interfaces : state of each contact pair.
     load_factors : (n_step,) load factor of each converged step.
     residuals : (n_iteration,) relative residual of each Newton iteration of all steps.
+    stress : (n_node, 6) Cauchy stress at the nodes, xx, yy, zz, xy, yz, xz; empty where it was not recovered.
     """
 
     displacement: FloatArray = field(metadata={"unit": "m", "axes": "dof"})
     interfaces: tuple[Interface, ...]
     load_factors: FloatArray = field(metadata={"unit": "1", "axes": "step"})
     residuals: FloatArray = field(metadata={"unit": "1", "axes": "iteration"})
+    stress: FloatArray = field(
+        default_factory=lambda: np.empty((0, 6)), metadata={"unit": "Pa", "axes": "node,component"}
+    )
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,8 @@ class Modes:
     sensors : names of the sensors.
     sensor_matrix : (n_sensor, n_dof) x = S q, dense rows (few sensors).
     alpha, beta : Rayleigh coefficients, 1/s and s.
+    effective_mass : (n_mode, 3) kg that moves with each mode along x, y, z; empty where it was not computed.
+    total_mass : kg.
     """
 
     frequency_hz: FloatArray = field(metadata={"unit": "Hz", "axes": "mode"})
@@ -109,6 +115,10 @@ class Modes:
     sensor_matrix: FloatArray = field(metadata={"unit": "1", "axes": "sensor,dof"})
     alpha: float
     beta: float
+    effective_mass: FloatArray = field(
+        default_factory=lambda: np.empty((0, 3)), metadata={"unit": "kg", "axes": "mode,direction"}
+    )
+    total_mass: float = float("nan")
 
 
 @dataclass(frozen=True)

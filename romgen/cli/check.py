@@ -8,8 +8,8 @@ from dataclasses import asdict
 from romgen.cli.failures import reported
 from romgen.cli.options import Json, Quiet, StudyPath, open_study
 from romgen.cli.output import Output
-from romgen.model_stages import share_out
-from romgen.settings import Study, estimate, study_warnings
+from romgen.model_stages import finite_elements, share_out
+from romgen.settings import Study, StudyError, estimate, study_warnings
 
 
 @reported
@@ -19,7 +19,7 @@ def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False
     if study.data is not None:
         share_out(study.data)
     out = Output(quiet=quiet, as_json=json_output)
-    warnings, size = study_warnings(study) + _missing(study), estimate(study)
+    warnings, size = study_warnings(study) + _missing(study), estimate(study, _open_meshes(study))
     for warning in warnings:
         out.text(f"warning: {warning}")
     out.text(describe(study))
@@ -32,9 +32,24 @@ def check(study_path: StudyPath, json_output: Json = False, quiet: Quiet = False
     out.document({"study": study.name, "problems": [], "warnings": warnings, "estimate": sizes})
 
 
+def _open_meshes(study: Study) -> int:
+    """Open the mesh files of a study and return the number of their nodes.
+
+    Raises
+    ------
+    StudyError : files that cannot be used, and names that they do not have.
+    """
+    if not (study.meshes or study.regions) or _missing(study):
+        return 0
+    problems, nodes = finite_elements("fe_stages").mesh_file_problems(study)
+    if problems:
+        raise StudyError(problems)
+    return int(nodes)
+
+
 def _missing(study: Study) -> tuple[str, ...]:
     """Say what this machine lacks to run the study."""
-    if study.blocks and importlib.util.find_spec("skfem") is None:
+    if study.bodies and importlib.util.find_spec("skfem") is None:
         return ("this machine cannot run the study: scikit-fem is not installed; pip install 'romgen[fem]'",)
     return ()
 
@@ -50,6 +65,11 @@ def describe(study: Study) -> str:
     ringdowns = study.ringdowns
     training, validation = (len(ringdowns.training), len(ringdowns.validation)) if ringdowns else (0, 0)
     return (
-        f"{study.name}: {len(study.blocks)} blocks, {len(study.contacts)} contact pairs, {len(study.sensors)} sensors, "
+        f"{study.name}: {_bodies(study)}, {len(study.contacts)} contact pairs, {len(study.sensors)} sensors, "
         f"{training} training and {validation} validation ring-downs"
     )
+
+
+def _bodies(study: Study) -> str:
+    parts = [f"{len(study.blocks)} blocks"] if study.blocks else []
+    return ", ".join([*parts, f"{len(study.meshes)} mesh files"] if study.meshes else parts)

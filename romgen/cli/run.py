@@ -61,6 +61,9 @@ def _headlines(summary: dict[str, Any], out: Output) -> None:
     if "modes" in summary:
         hertz = ", ".join(f"{value:.2f}" for value in summary["modes"]["frequency_hz"])
         out.text(f"modes at {hertz} Hz")
+        for pair in summary["modes"].get("near_integer_ratios", [])[:3]:
+            first, second = pair["modes"]
+            out.text(f"modes {first} and {second} are {pair['detuning_percent']:+.2f} % off {pair['ratio']}")
     for role, errors in summary["learn"]["nmte_percent"].items():
         out.text(f"NMTE {role}: " + ", ".join(f"{name} {value:.2f} %" for name, value in errors.items()))
     out.text(f"FMU against Python model: {summary['fmu']['native_vs_python_rel']:.1e} relative")

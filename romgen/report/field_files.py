@@ -18,10 +18,20 @@ def _at_nodes(dof_values: FloatArray) -> FloatArray:
 
 
 def write_preload_field(directory: Path, structure: Structure, preload: Preload) -> Path:
-    """Write preload.vtu with the static displacement in m on the undeformed mesh."""
+    """Write preload.vtu with the static displacement in m and the stress in Pa on the undeformed mesh."""
     path = directory / "preload.vtu"
-    write_vtu(path, structure, {"preload displacement [m]": _at_nodes(preload.displacement)})
+    fields = {"preload displacement [m]": _at_nodes(preload.displacement)}
+    if len(preload.stress):
+        fields |= {"Cauchy stress [Pa]": preload.stress, "von Mises stress [Pa]": von_mises(preload.stress)}
+    write_vtu(path, structure, fields)
     return path
+
+
+def von_mises(stress: FloatArray) -> FloatArray:
+    """Von Mises stress (n_node,) of xx, yy, zz, xy, yz, xz, (n_node, 6), in Pa."""
+    direct, shear = stress[:, :3], stress[:, 3:]
+    differences = (direct - np.roll(direct, 1, axis=1)) ** 2
+    return np.asarray(np.sqrt(0.5 * differences.sum(axis=1) + 3.0 * (shear**2).sum(axis=1)))
 
 
 def write_mode_fields(directory: Path, structure: Structure, modes: Modes) -> Path:

@@ -20,6 +20,7 @@ def frequency_table(modes: Modes) -> TableBlock:
             f"{modes.frequency_hz[k]:.3f}",
             f"{100.0 * modes.damping_ratio[k]:.4f}",
             *(f"{value:+.4e}" for value in modes.modal_load[k]),
+            *(f"{100.0 * value / modes.total_mass:.2f}" for row in modes.effective_mass[k : k + 1] for value in row),
         )
         for k in range(modes.frequency_hz.size)
     )
@@ -27,12 +28,14 @@ def frequency_table(modes: Modes) -> TableBlock:
         f"load by {name} [√kg per {unit_text(unit)}]"
         for name, unit in zip(modes.inputs, modes.input_units, strict=True)
     )
+    masses = tuple(f"mass along {axis} [%]" for axis in "xyz") if len(modes.effective_mass) else ()
     caption = (
         "Modes about the preloaded state. "
         f"Damping is Rayleigh: alpha = {modes.alpha:.6g} 1/s, beta = {modes.beta:.6g} s. "
-        "A modal load near zero means that input does not drive the mode."
+        "A modal load near zero means that input does not drive the mode. The effective mass is the share of the mass "
+        "that moves with a mode along an axis."
     )
-    return TableBlock(caption, ("mode", "frequency [Hz]", "damping ratio [%]", *loads), rows)
+    return TableBlock(caption, ("mode", "frequency [Hz]", "damping ratio [%]", *loads, *masses), rows)
 
 
 def near_integer_ratios(

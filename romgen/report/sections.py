@@ -43,7 +43,7 @@ def structure_section(inputs: ReportInputs) -> Section | None:
     counts = np.bincount(structure.cell_body, minlength=len(structure.bodies))
     text = (
         f"{structure.points.shape[0]:,} nodes, {3 * structure.points.shape[0]:,} degrees of freedom, "
-        f"{structure.cells.shape[0]:,} {structure.cell_type} elements in a box of "
+        f"{structure.cells.shape[0]:,} {' and '.join(dict.fromkeys(structure.cell_types))} elements in a box of "
         f"{' x '.join(f'{1e3 * d:.4g}' for d in high - low)} mm."
     )
     rows = tuple((name, f"{count:,}") for name, count in zip(structure.bodies, counts, strict=True))

@@ -31,8 +31,12 @@ def _edge_keys(first: IntArray, second: IntArray, n_node: int) -> IntArray:
 def mesh_edges(structure: Structure) -> BoolArray:
     """(n_triangle, 3) whether the edge opposite each corner of a skin triangle is an element edge, not a diagonal."""
     n_node = structure.points.shape[0]
-    pairs = np.array(_TET_EDGES if structure.cell_type == "tet10" else _HEX_EDGES)
-    in_cells = _edge_keys(structure.cells[:, pairs[:, 0]], structure.cells[:, pairs[:, 1]], n_node)
+    keys = []
+    for body, kind in enumerate(structure.cell_types):
+        pairs = np.array(_TET_EDGES if kind == "tet10" else _HEX_EDGES)
+        cells = structure.cells[structure.cell_body == body]
+        keys.append(_edge_keys(cells[:, pairs[:, 0]], cells[:, pairs[:, 1]], n_node).ravel())
+    in_cells = np.concatenate(keys)
     following, last = np.roll(structure.skin, -1, axis=1), np.roll(structure.skin, -2, axis=1)
     return np.isin(_edge_keys(following, last, n_node), in_cells)
 
@@ -40,7 +44,8 @@ def mesh_edges(structure: Structure) -> BoolArray:
 def triangle_body(structure: Structure) -> IntArray:
     """(n_triangle,) body of each skin triangle: the one that holds all its corners."""
     holds = np.zeros((structure.points.shape[0], len(structure.bodies)), dtype=bool)
-    holds[structure.cells, structure.cell_body[:, None]] = True
+    used = structure.cells >= 0
+    holds[structure.cells[used], np.repeat(structure.cell_body, used.sum(axis=1))] = True
     body: IntArray = np.argmax(holds[structure.skin].all(axis=1), axis=1).astype(np.int64)
     return body
 

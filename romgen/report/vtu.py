@@ -60,11 +60,12 @@ def write_vtu(path: Path, structure: Structure, point_fields: Fields, cell_field
     Source: Kitware, VTK File Formats, UnstructuredGrid.
     """
     n_node, n_cell = structure.points.shape[0], structure.cells.shape[0]
-    offsets = structure.cells.shape[1] * np.arange(1, n_cell + 1, dtype=np.int64)
-    types = np.full(n_cell, CELL_TYPES[structure.cell_type], dtype=np.uint8)
+    used = structure.cells >= 0
+    offsets = np.cumsum(used.sum(axis=1), dtype=np.int64)
+    types = np.array([CELL_TYPES[kind] for kind in structure.cell_types], dtype=np.uint8)[structure.cell_body]
     points = _data_array("points", structure.points)
     topology = (
-        _data_array("connectivity", structure.cells.ravel())
+        _data_array("connectivity", structure.cells[used])
         + _data_array("offsets", offsets)
         + _data_array("types", types)
     )

@@ -1,7 +1,7 @@
 """The tables of study.toml as frozen, strict records, and the checks before anything is computed."""
 
 from romgen.settings.base import Settings
-from romgen.settings.checks import study_warnings, surfaces
+from romgen.settings.checks import named_surfaces, study_warnings, surfaces, unknown
 from romgen.settings.data import DataSettings
 from romgen.settings.estimate import Estimate, estimate
 from romgen.settings.finite_elements import (
@@ -27,6 +27,7 @@ from romgen.settings.learning import (
     ReportSettings,
 )
 from romgen.settings.load import StudyError, load_study
+from romgen.settings.mesh_files import MeshSettings, RegionSettings
 from romgen.settings.study import Study, StudySettings
 
 __all__ = [
@@ -44,8 +45,10 @@ __all__ = [
     "LearnSettings",
     "LoadSettings",
     "MaterialSettings",
+    "MeshSettings",
     "ModesSettings",
     "PreloadSettings",
+    "RegionSettings",
     "ReportSettings",
     "RingDownSettings",
     "RingDownStart",
@@ -56,6 +59,8 @@ __all__ = [
     "StudySettings",
     "estimate",
     "load_study",
+    "named_surfaces",
     "study_warnings",
     "surfaces",
+    "unknown",
 ]

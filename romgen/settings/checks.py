@@ -44,11 +44,22 @@ def study_warnings(study: Study) -> tuple[str, ...]:
 
 
 def surfaces(study: Study) -> tuple[str, ...]:
-    """Return the names of all block faces, "<block>.<axis>_<min|max>"."""
-    return tuple(f"{block}.{axis}_{end}" for block, axis, end in product(study.blocks, "xyz", ("min", "max")))
+    """Return the names of all block faces, "<block>.<axis>_<min|max>", and of all regions, "<body>.<region>"."""
+    faces = (f"{block}.{axis}_{end}" for block, axis, end in product(study.blocks, "xyz", ("min", "max")))
+    return (*faces, *(f"{region.body}.{name}" for name, region in study.regions.items()))
 
 
-def _unknown(where: str, kind: str, name: str, known: Iterable[str]) -> str:
+def named_surfaces(study: Study) -> tuple[tuple[str, str], ...]:
+    """Return where the study names a surface or a set of nodes, and the name, "<body>.<surface>"."""
+    named = [(f"[contacts.{name}] slave:", pair.slave) for name, pair in study.contacts.items()]
+    named += [(f"[contacts.{name}] master:", pair.master) for name, pair in study.contacts.items()]
+    named += [(f"[constraints[{k}]] surface:", item.surface) for k, item in enumerate(study.constraints)]
+    named += [(f"[loads[{k}]] surface:", item.surface) for k, item in enumerate(study.loads) if item.surface]
+    return tuple(named)
+
+
+def unknown(where: str, kind: str, name: str, known: Iterable[str]) -> str:
+    """Return the line that says a name is not known, with the closest one that is."""
     known = tuple(known)
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     advice = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(known) or 'none'}"
@@ -67,21 +78,29 @@ def _model_checks(study: Study) -> tuple[Iterator[str], ...]:
 
 
 def _material_problems(study: Study) -> Iterator[str]:
-    for name, block in study.blocks.items():
-        if block.material not in study.materials:
-            yield _unknown(f"[blocks.{name}] material:", "material", block.material, study.materials)
+    for name, body in study.bodies.items():
+        if body.material not in study.materials:
+            table = "blocks" if name in study.blocks else "meshes"
+            yield unknown(f"[{table}.{name}] material:", "material", body.material, study.materials)
+    for name, mesh in study.meshes.items():
+        if not mesh.file.is_file():
+            yield f"[meshes.{name}] file: no such file; got '{mesh.file}'"
 
 
 def _surface_problems(study: Study) -> Iterator[str]:
+    """Names on bodies from mesh files are checked when the files are opened."""
     known = surfaces(study)
-    named = [(f"[contacts.{name}] slave:", pair.slave) for name, pair in study.contacts.items()]
-    named += [(f"[contacts.{name}] master:", pair.master) for name, pair in study.contacts.items()]
-    named += [(f"[constraints[{k}]] surface:", item.surface) for k, item in enumerate(study.constraints)]
-    named += [(f"[loads[{k}]] surface:", item.surface) for k, item in enumerate(study.loads)]
-    for where, surface in named:
-        if surface not in known:
-            own = [name for name in known if name.split(".")[0] == surface.split(".")[0]]
-            yield _unknown(where, "surface", surface, own or known)
+    for name, region in study.regions.items():
+        if region.body not in study.bodies:
+            yield unknown(f"[regions.{name}] body:", "body", region.body, study.bodies)
+    for where, surface in named_surfaces(study):
+        body, _, parts = surface.partition(".")
+        if body in study.meshes:
+            continue
+        for part in [parts] if where.startswith("[contacts") else parts.split("&"):
+            if f"{body}.{part}" not in known and not (body in study.blocks and part == "skin"):
+                own = [name for name in known if name.split(".")[0] == body]
+                yield unknown(where, "surface", f"{body}.{part}" if parts else surface, own or known)
 
 
 def _contact_problems(study: Study) -> Iterator[str]:
@@ -97,7 +116,7 @@ def _sensor_problems(study: Study) -> Iterator[str]:
     if not study.sensors:
         yield "[sensors] is empty; name at least one, such as [sensors.mid]"
     for name, sensor in study.sensors.items():
-        if not any(_inside(block, sensor.point) for block in study.blocks.values()):
+        if not study.meshes and not any(_inside(block, sensor.point) for block in study.blocks.values()):
             yield f"[sensors.{name}] point lies in no block; got {list(sensor.point)} m"
 
 
@@ -168,15 +187,15 @@ def _learn_problems(study: Study) -> Iterator[str]:
 def _downstream_problems(study: Study) -> Iterator[str]:
     forced, known = study.forced_response, study.sensor_names
     if forced.sensor is not None and forced.sensor not in known:
-        yield _unknown("[forced_response] sensor:", "sensor", forced.sensor, known)
+        yield unknown("[forced_response] sensor:", "sensor", forced.sensor, known)
     inputs = ("base_acceleration",) if study.base_acceleration is not None else ()
     if forced.levels and forced.input not in inputs:
-        yield _unknown("[forced_response] input:", "load input", forced.input, inputs)
+        yield unknown("[forced_response] input:", "load input", forced.input, inputs)
     if study.forced_validation is not None and (study.data is not None or not forced.levels):
         yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"
     for platform in study.fmu.platforms:
         if platform not in PLATFORMS:
-            yield _unknown("[fmu] platforms:", "platform", platform, PLATFORMS)
+            yield unknown("[fmu] platforms:", "platform", platform, PLATFORMS)
     for sensor in study.fmu.sensors or ():
         if sensor not in known:
-            yield _unknown("[fmu] sensors:", "sensor", sensor, known)
+            yield unknown("[fmu] sensors:", "sensor", sensor, known)

@@ -38,22 +38,28 @@ class Estimate:
     wall_s: float
 
 
-def hex20_nodes(block: BlockSettings) -> int:
-    """Number of nodes of a structured block of quadratic serendipity hexahedra: corners plus edges."""
+def block_nodes(block: BlockSettings) -> int:
+    """Number of nodes of a structured block: corners and edges, with HEX27 and TET10 also face and cell centres."""
     n = np.array([sum(block.axis(axis)[1]) for axis in ("x", "y", "z")])
+    if block.element != "hex20":
+        return int(np.prod(2 * n + 1))
     corners = int(np.prod(n + 1))
     edges = sum(int(n[k] * np.prod(np.delete(n, k) + 1)) for k in range(3))
     return corners + edges
 
 
-def estimate(study: Study) -> Estimate | None:
+def estimate(study: Study, mesh_nodes: int = 0) -> Estimate | None:
     """Estimate size, memory and run time of the ring-downs; None for a study from data.
 
     Scaled from the measured reference with n^(4/3) for fill and solves; snapshots are kept in single precision.
+
+    Parameters
+    ----------
+    mesh_nodes : number of nodes of the bodies that come from files.
     """
     if study.ringdowns is None:
         return None
-    dofs = 3 * sum(hex20_nodes(block) for block in study.blocks.values())
+    dofs = 3 * (mesh_nodes + sum(block_nodes(block) for block in study.blocks.values()))
     growth = (dofs / REFERENCE_DOFS) ** FILL_EXPONENT
     starts, steps = len(study.ringdowns.starts), study.ringdowns.steps
     snapshots = 4 * dofs * starts * (steps // study.ringdowns.snapshot_stride + 1)

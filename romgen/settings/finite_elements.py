@@ -15,6 +15,7 @@ from romgen.settings.base import (
     Penalty,
     PositiveLength,
     PositiveTime,
+    Pressure,
     Ratio,
     Settings,
 )
@@ -42,7 +43,7 @@ class BlockSettings(Settings):
 
     material: str
     kinematics: Literal["green_lagrange", "linear"] = "green_lagrange"
-    element: Literal["hex20"] = "hex20"
+    element: Literal["hex20", "hex27", "tet10"] = "hex20"
     x: tuple[Length, ...] = Field(min_length=2)
     cells_x: tuple[int, ...]
     y: tuple[Length, ...] = Field(min_length=2)
@@ -83,18 +84,43 @@ class ContactSettings(Settings):
 
 
 class ConstraintSettings(Settings):
-    """Table [[constraints]]: displacement components held at zero on a face."""
+    """Table [[constraints]]: displacement components held on a face, edge or point; "normal" is a plane of symmetry."""
 
     surface: str
-    directions: tuple[Direction, ...] = Field(min_length=1)
+    directions: tuple[Literal["x", "y", "z", "normal"], ...] = Field(min_length=1)
+    displacement: tuple[Length, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_value_each(self) -> Self:
+        if self.displacement and len(self.displacement) != len(self.directions):
+            raise ValueError(f"displacement needs one value for each of {', '.join(self.directions)}")
+        return self
 
 
 class LoadSettings(Settings):
-    """Table [[loads]]: a uniform dead pressure on a face, given by its resultant along the inward normal."""
+    """Table [[loads]]: one dead load: pressure by its resultant, force, traction, or the acceleration of gravity."""
 
     name: str
-    surface: str
-    total_force: Force
+    surface: str | None = None
+    point: tuple[Length, Length, Length] | None = None
+    total_force: Force | None = None
+    force: tuple[Force, Force, Force] | None = None
+    traction: tuple[Pressure, Pressure, Pressure] | None = None
+    acceleration: tuple[float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        kinds = ("total_force", "force", "traction", "acceleration")
+        given = [kind for kind in kinds if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise ValueError(f"needs one of {', '.join(kinds)}; got {', '.join(given) or 'none'}")
+        places = [place for place in ("surface", "point") if getattr(self, place) is not None]
+        ways_of_kind: dict[str, list[list[str]]] = {"acceleration": [[]], "force": [["surface"], ["point"]]}
+        wanted = ways_of_kind.get(given[0], [["surface"]])
+        if places not in wanted:
+            ways = " or ".join(" and ".join(way) or "no place" for way in wanted)
+            raise ValueError(f"{given[0]} goes with {ways}; got {', '.join(places) or 'none'}")
+        return self
 
 
 class PreloadSettings(Settings):

@@ -28,6 +28,7 @@ from romgen.settings.learning import (
     LearnSettings,
     ReportSettings,
 )
+from romgen.settings.mesh_files import MeshSettings, RegionSettings
 
 
 class StudySettings(Settings):
@@ -38,11 +39,13 @@ class StudySettings(Settings):
 
 
 class Study(Settings):
-    """All tables of study.toml: either a finite-element model (blocks, ringdowns) or recorded data."""
+    """All tables of study.toml: either a finite-element model (blocks or meshes, ringdowns) or recorded data."""
 
     study: StudySettings
     materials: dict[str, MaterialSettings] = Field(default_factory=dict)
     blocks: dict[str, BlockSettings] = Field(default_factory=dict)
+    meshes: dict[str, MeshSettings] = Field(default_factory=dict)
+    regions: dict[str, RegionSettings] = Field(default_factory=dict)
     contacts: dict[str, ContactSettings] = Field(default_factory=dict)
     constraints: tuple[ConstraintSettings, ...] = ()
     loads: tuple[LoadSettings, ...] = ()
@@ -61,18 +64,27 @@ class Study(Settings):
 
     @model_validator(mode="after")
     def _model_or_data(self) -> Self:
-        if self.data is not None and (self.blocks or self.ringdowns is not None):
+        bodies = bool(self.blocks or self.meshes)
+        if self.data is not None and (bodies or self.ringdowns is not None):
             raise ValueError("has both [data] and a finite-element model; keep one of them")
-        if self.data is None and not self.blocks:
-            raise ValueError("has neither [data] nor [blocks.<name>]; add one of them")
-        if self.blocks and self.ringdowns is None:
-            raise ValueError("has [blocks] but no [ringdowns]; add the table")
+        if self.data is None and not bodies:
+            raise ValueError("has neither [data] nor [blocks.<name>] or [meshes.<name>]; add one of them")
+        if bodies and self.ringdowns is None:
+            raise ValueError("has [blocks] or [meshes] but no [ringdowns]; add the table")
+        both = sorted(set(self.blocks) & set(self.meshes))
+        if both:
+            raise ValueError(f"has a block and a mesh of the same name: {', '.join(both)}")
         return self
 
     @property
     def name(self) -> str:
         """Identifier of the study: letters, digits, underscore."""
         return self.study.name
+
+    @property
+    def bodies(self) -> dict[str, BlockSettings | MeshSettings]:
+        """All bodies, blocks first."""
+        return {**self.blocks, **self.meshes}
 
     @property
     def sensor_names(self) -> tuple[str, ...]:

@@ -85,7 +85,12 @@ def test_preload(summary: dict[str, Any]) -> None:
 
 
 def test_modes(summary: dict[str, Any]) -> None:
-    assert summary["modes"] == {"frequency_hz": [110.0, 198.0], "damping_ratio": [0.004, 0.004], "ratio": 1.8}
+    assert summary["modes"] == {
+        "frequency_hz": [110.0, 198.0],
+        "damping_ratio": [0.004, 0.004],
+        "ratio": 1.8,
+        "near_integer_ratios": [{"modes": [1, 2], "ratio": "1:2", "detuning_percent": pytest.approx(-10.0)}],
+    }
 
 
 def test_ringdowns(summary: dict[str, Any]) -> None:

@@ -63,7 +63,7 @@ def structure() -> Structure:
     cells = np.vstack([panel_cells, lower_cells + len(panel), upper_cells + len(panel) + len(lower)])
     body = np.repeat([0, 1, 2], [len(panel_cells), len(lower_cells), len(upper_cells)])
     points = np.vstack([panel, lower, upper])
-    return Structure(points, cells, "hex20", body, ("panel", "support", "blade"), outer_triangles(cells))
+    return Structure(points, cells, ("hex20",) * 3, body, ("panel", "support", "blade"), outer_triangles(cells))
 
 
 def _interface(name: str, z: float, force: float) -> Interface:

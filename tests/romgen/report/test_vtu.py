@@ -42,7 +42,7 @@ def one_element(cell_type: str) -> Structure:
     straight = np.vstack(points)
     cells = np.arange(len(straight))[None]
     skin = np.array([[0, 1, 2]])
-    return Structure(bend(straight), cells, cell_type, np.array([0]), ("body",), skin)
+    return Structure(bend(straight), cells, (cell_type,), np.array([0]), ("body",), skin)
 
 
 @pytest.mark.parametrize("cell_type", ["hex20", "hex27", "tet10"])

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from romgen.settings import Study, estimate
-from romgen.settings.estimate import BASE_MEMORY_BYTES, hex20_nodes
+from romgen.settings.estimate import BASE_MEMORY_BYTES, block_nodes
 from romgen.settings.finite_elements import BlockSettings
 
 
@@ -17,9 +17,9 @@ def block(n: tuple[int, int, int]) -> BlockSettings:
 
 
 def test_nodes_of_hex20_blocks() -> None:
-    assert hex20_nodes(block((1, 1, 1))) == 20
-    assert hex20_nodes(block((2, 1, 1))) == 20 + 12  # one shared face of 8 nodes
-    assert hex20_nodes(block((3, 2, 2))) == 4 * 3 * 3 + 3 * 9 + 4 * 2 * 3 + 4 * 3 * 2
+    assert block_nodes(block((1, 1, 1))) == 20
+    assert block_nodes(block((2, 1, 1))) == 20 + 12  # one shared face of 8 nodes
+    assert block_nodes(block((3, 2, 2))) == 4 * 3 * 3 + 3 * 9 + 4 * 2 * 3 + 4 * 3 * 2
 
 
 def test_cost_grows_with_size_and_steps(tables: dict[str, Any]) -> None:
