@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fem.arrays import FloatArray, IntArray
+from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.errors import FemInputError
 from fem.friction import traction_tangents, tractions
 from fem.pairing import Projection, SurfacePoints, facet_sizes, mean_size, project
@@ -64,6 +64,7 @@ class Contact:
     area : (n_point,) m^2; initial_gap : (n_point,) m; law : (n_point, 3) k_n, k_t, mu.
     points : (n_point, 3) m; names : pairs; pair : (n_point,) index into names.
     facet_size : (n_point,) m, slave; slide_limit : (n_point,) m, slip up to which the frozen projection serves.
+    frame : (n_point, 3, 3) rows normal (out of the master), tangent 1, tangent 2.
     """
 
     operator: sp.csr_matrix
@@ -75,6 +76,7 @@ class Contact:
     pair: IntArray
     facet_size: FloatArray
     slide_limit: FloatArray
+    frame: FloatArray
 
     @property
     def n_point(self) -> int:
@@ -120,6 +122,13 @@ class Contact:
         blocks[closed, 1, 1] = blocks[closed, 2, 2] = self.law[closed, 1]
         return self._assemble(blocks)
 
+    def bilateral_traction(self, relative: FloatArray, slip: FloatArray) -> FloatArray:
+        """Tractions (3 n_point,) of an interface that neither opens nor slips: what closes a gap in one step."""
+        traction = relative.reshape(-1, 3).copy()
+        traction[:, 0] += self.initial_gap
+        traction[:, 1:] -= slip
+        return (traction * self.law[:, [0, 1, 1]]).ravel()
+
     def stored_energy(self, traction: FloatArray) -> FloatArray:
         """Elastic energy of the penalties sum w (tau_n^2/k_n + tau_t^2/k_t)/2, (n_case,) J."""
         stiffness = self.law[:, [0, 1, 1]].ravel()
@@ -129,6 +138,11 @@ class Contact:
         """Work of friction over one increment sum w tau_t . (s_p_new - s_p), (n_case,) J; open points do none."""
         tangential = traction.reshape(self.n_point, 3, traction.shape[1])[:, 1:, :]
         return np.asarray(np.einsum("g,gdc,gdc->c", self.area, tangential, new_slip - slip))
+
+    def dissipation_density(self, traction: FloatArray, slip: FloatArray, new_slip: FloatArray) -> FloatArray:
+        """Work of friction per area of one increment tau_t . (s_p_new - s_p), (n_point, n_case) J/m^2."""
+        tangential = traction.reshape(self.n_point, 3, traction.shape[1])[:, 1:, :]
+        return np.asarray(np.einsum("gdc,gdc->gc", tangential, new_slip - slip))
 
     def _assemble(self, blocks: FloatArray) -> sp.csr_matrix:
         index = np.arange(self.n_point)
@@ -159,8 +173,10 @@ def contact_pair(
             "no slave point finds the master surface", where=f"contact {name}", value=distance, advice=advice
         )
     gap = np.einsum("gi,gi->g", source.points - target.points, target.normals)[paired]
+    normal = target.normals[paired]
+    frame = np.stack([normal, *_tangents(normal)], axis=1)
     return Contact(
-        _operator(source, target, paired, 3 * len(points)),
+        _operator(source, target, paired, frame, 3 * len(points)),
         source.area[paired],
         gap,
         np.tile([law.normal_penalty, law.tangential_penalty, law.friction], (int(paired.sum()), 1)),
@@ -169,6 +185,7 @@ def contact_pair(
         np.zeros(int(paired.sum()), dtype=np.int64),
         facet_sizes(points, slave)[source.facet[paired]],
         _SLIDE * facet_sizes(points, master)[target.facet[paired]],
+        frame,
     )
 
 
@@ -177,7 +194,8 @@ def join(contacts: tuple[Contact, ...], n_dof: int) -> Contact:
     if not contacts:
         empty = np.empty(0)
         rows, none = np.empty((0, 3)), np.empty(0, dtype=np.int64)
-        return Contact(sp.csr_matrix((0, n_dof)), empty, empty, rows, rows, (), none, empty, empty)
+        frames = np.empty((0, 3, 3))
+        return Contact(sp.csr_matrix((0, n_dof)), empty, empty, rows, rows, (), none, empty, empty, frames)
     return Contact(
         sp.vstack([c.operator for c in contacts], format="csr"),
         np.concatenate([c.area for c in contacts]),
@@ -188,12 +206,13 @@ def join(contacts: tuple[Contact, ...], n_dof: int) -> Contact:
         np.concatenate([np.full(c.n_point, i, dtype=np.int64) for i, c in enumerate(contacts)]),
         np.concatenate([c.facet_size for c in contacts]),
         np.concatenate([c.slide_limit for c in contacts]),
+        np.concatenate([c.frame for c in contacts]),
     )
 
 
-def _operator(source: SurfacePoints, target: Projection, paired: np.ndarray, n_dof: int) -> sp.csr_matrix:
-    normal = target.normals[paired]
-    frame = np.stack([normal, *_tangents(normal)], axis=1)
+def _operator(
+    source: SurfacePoints, target: Projection, paired: BoolArray, frame: FloatArray, n_dof: int
+) -> sp.csr_matrix:
     nodes = np.hstack([source.nodes[paired], target.nodes[paired]])
     weight = np.hstack([source.shape[paired], -target.shape[paired]])
     data = np.einsum("gri,ga->grai", frame, weight)

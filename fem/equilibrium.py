@@ -8,6 +8,7 @@ import numpy as np
 
 from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
+from fem.interfaces import Pair, Tie
 from fem.model import Model
 
 
@@ -92,11 +93,12 @@ def _dofs(model: Model, name: str) -> tuple[int, int]:
 
 
 def _group(model: Model, body: str, without: int) -> set[str]:
-    """Bodies that the other pairs connect to ``body``."""
+    """Bodies that the ties and the other pairs connect to ``body``."""
     group, grown = {body}, True
     while grown:
         grown = False
-        for number, pair in enumerate(model.pairs):
+        joints: tuple[Pair | Tie, ...] = (*model.pairs, *model.ties)
+        for number, pair in enumerate(joints):
             ends = {pair.slave.split(".")[0], pair.master.split(".")[0]}
             if number != without and ends & group and not ends <= group:
                 group, grown = group | ends, True

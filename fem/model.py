@@ -11,16 +11,18 @@ import scipy.sparse as sp
 from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.assembly import Cells, lumped_masses, make_cells, mass_blocks
 from fem.body import Body, locate
-from fem.contact import Contact, ContactLaw, contact_pair, join
+from fem.bolt import Bolt, BoltSet, bolt_set, cut_bolts
+from fem.contact import Contact, join
 from fem.errors import FemInputError
+from fem.interfaces import Pair, Tie, bond_stiffness, default_penalty, pair_contact, tie_bond
 from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Traction, load_vector
-from fem.pairing import surface_points
 from fem.sparse_product import SparseProduct
 from fem.supports import AXES, Support, held
 
 __all__ = [
     "AXES",
     "Body",
+    "Bolt",
     "Clamp",
     "Force",
     "Gravity",
@@ -28,22 +30,11 @@ __all__ = [
     "Pair",
     "PointForce",
     "Support",
+    "Tie",
     "Traction",
     "build_model",
     "default_penalty",
 ]
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A frictional interface between two surfaces named "<body>.<surface>"; penalties default: ``default_penalty``."""
-
-    name: str
-    slave: str
-    master: str
-    friction: float
-    normal_penalty: float | None = None
-    tangential_penalty: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,11 +45,12 @@ class Model:
     ----------
     bodies : parts; offsets : first node of each.
     points : (n_node, 3) m.
-    nonlinear : cells with Green-Lagrange strain, per body; stiffness : (n_dof, n_dof) of the linear bodies, N/m.
+    nonlinear : cells with Green-Lagrange strain, per body; stiffness : (n_dof, n_dof) of linear bodies and ties, N/m.
     mass : (n_dof, n_dof) kg, consistent.
     contact : all interfaces; pairs : their definitions.
     free : (n_dof,) False where a support holds; prescribed : (n_dof,) m, displacement there at load factor 1.
     load : (n_dof,) N, sum of clamps and other loads at load factor 1; loads : (n_load, n_dof) each one, clamps first.
+    ties, bonds : bonded surfaces, then the sections of bolts, and their points; bolts : see ``BoltSet``.
     """
 
     bodies: tuple[Body, ...]
@@ -75,6 +67,9 @@ class Model:
     load: FloatArray
     loads: FloatArray
     prescribed: FloatArray
+    ties: tuple[Tie, ...]
+    bonds: Contact
+    bolts: BoltSet
 
     @property
     def n_dof(self) -> int:
@@ -140,17 +135,16 @@ def build_model(
     supports: Sequence[Support] = (),
     clamps: Sequence[Clamp] = (),
     loads: Sequence[Load] = (),
+    ties: Sequence[Tie] = (),
+    bolts: Sequence[Bolt] = (),
 ) -> Model:
-    """Assemble bodies, interfaces, supports, clamping pressures and other dead loads into a model.
+    """Assemble bodies, interfaces, ties, bolts, supports, clamping pressures and other dead loads into a model.
 
     Unknown names, inverted cells, interfaces without partners and numbers that are not finite raise ``FemInputError``.
     """
-    bodies = tuple(bodies)
-    names = [body.name for body in bodies]
-    if not names or len(set(names)) < len(names):
-        raise FemInputError("a model needs bodies with names of their own", where="model", value=", ".join(names))
-    counts = [len(body.mesh.points) for body in bodies]
-    offsets = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+    _check_names(bodies)
+    bodies, sections = cut_bolts(bodies, bolts)
+    offsets = np.concatenate([[0], np.cumsum([len(body.mesh.points) for body in bodies])[:-1]]).astype(np.int64)
     points = np.vstack([body.mesh.points for body in bodies])
     n_node = len(points)
     nonlinear, stiffness, mass = [], sp.csr_matrix((3 * n_node, 3 * n_node)), sp.csr_matrix((3 * n_node, 3 * n_node))
@@ -161,7 +155,10 @@ def build_model(
             stiffness = stiffness + cells.assemble(cells.element_tangents(np.zeros(3 * n_node)))
         else:
             nonlinear.append(cells)
-    contact = join(tuple(_contact(bodies, offsets, points, pair) for pair in pairs), 3 * n_node)
+    contact = join(tuple(pair_contact(bodies, offsets, points, pair) for pair in pairs), 3 * n_node)
+    all_ties = (*ties, *sections)
+    bonds = tuple(tie_bond(bodies, offsets, points, tie) for tie in all_ties)
+    stiffness = sum((bond_stiffness(bond) for bond in bonds), stiffness)
     assembly = Assembly(bodies, offsets, points, mass)
     vectors = np.array([load_vector(load, assembly) for load in (*clamps, *loads)]).reshape(-1, 3 * n_node)
     free, prescribed = held(bodies, offsets, n_node, supports)
@@ -180,26 +177,13 @@ def build_model(
         vectors.sum(axis=0),
         vectors,
         prescribed,
+        all_ties,
+        join(bonds, 3 * n_node),
+        bolt_set(bolts, bonds[len(bonds) - len(sections) :], 3 * n_node),
     )
 
 
-def default_penalty(body: Body, facets: IntArray) -> float:
-    """k = E / h with the mean facet size h: the interface is as stiff as a layer of one facet size, Pa/m.
-
-    Its error is an extra compliance: penetration p / k, and elastic slip tau / k before real slip.
-    """
-    surface = surface_points(body.mesh.points, facets)
-    return body.material.young_modulus / float(np.sqrt(surface.area.sum() / len(facets)))
-
-
-def _contact(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, pair: Pair) -> Contact:
-    s, slave = locate(bodies, pair.slave)
-    m, master = locate(bodies, pair.master)
-    facets = bodies[s].mesh.surface(slave)
-    default = default_penalty(bodies[s], facets)
-    law = ContactLaw(
-        default if pair.normal_penalty is None else pair.normal_penalty,
-        default if pair.tangential_penalty is None else pair.tangential_penalty,
-        pair.friction,
-    )
-    return contact_pair(pair.name, points, facets + offsets[s], bodies[m].mesh.surface(master) + offsets[m], law)
+def _check_names(bodies: Sequence[Body]) -> None:
+    names = [body.name for body in bodies]
+    if not names or len(set(names)) < len(names):
+        raise FemInputError("a model needs bodies with names of their own", where="model", value=", ".join(names))

@@ -1,23 +1,24 @@
-"""Static equilibrium under the clamping loads, with contact and friction."""
+"""Static equilibrium under loads, moved supports and tightened bolts, with contact and friction."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fem.arrays import FloatArray
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
-from fem.linear_solver import make_solver
 from fem.model import Model
+from fem.newton import LoadStep, Target, Tolerance, internal_force
 from fem.rigid_motion import check_restraint
+from fem.sliding import warn_of_sliding
 
 Progress = Callable[[float], None]
 
-_ROUNDOFF = 1e-14
-"""Share of the forces inside a body that cancellation leaves in its residual."""
+_EASY = 6
+"""Iterations of a load step after which the next one may be twice as long again."""
 
 
 @dataclass(frozen=True)
@@ -29,22 +30,31 @@ class StaticState:
     u : (n_dof,) m.
     contact : tractions, slip and status of all points, one case.
     load_factors : converged load factors; residuals : relative residual of every iteration of every step.
+    dissipated : (n_point,) work of friction on the way, J/m^2; None where it was not kept.
     """
 
     u: FloatArray
     contact: ContactState
     load_factors: tuple[float, ...]
     residuals: tuple[float, ...]
+    dissipated: FloatArray | None = None
 
 
 @dataclass(frozen=True)
 class StaticSettings:
-    """Number of equal load steps, relative residual, iterations per step, linear solver by name."""
+    """How to load.
+
+    Attributes
+    ----------
+    steps : equal load steps; a step that fails is halved, up to ``cuts`` times.
+    tolerance : residual relative to the load; max_iterations : per step; solver : linear solver by name.
+    """
 
     steps: int = 4
     tolerance: float = 1e-8
     max_iterations: int = 30
     solver: str = "auto"
+    cuts: int = 6
 
 
 def solve_static(
@@ -57,6 +67,8 @@ def solve_static(
 ) -> StaticState:
     """Load-stepped Newton with line search: f_int(u) + f_contact(u, slip) = load, u = prescribed where a support holds.
 
+    Bolts keep the shortening at which they are locked, none in a new model: ``solve_preload`` tightens them.
+
     Parameters
     ----------
     load : (n_dof,) N at the end; the steps go from the load that ``start`` carries (none: zero) to it, and from its
@@ -66,115 +78,117 @@ def solve_static(
     Raises
     ------
     FemConvergenceError : with the residual history; what converged before is in ``last_good`` of the error.
-    FemInputError : a body that nothing holds, or a load that is not finite.
+    FemInputError : a body that nothing holds, an interface that never closes, or a load that is not finite.
     """
-    check_restraint(model)
-    if not np.isfinite(load).all():
-        node, axis = divmod(int(np.flatnonzero(~np.isfinite(load))[0]), 3)
-        raise FemInputError("the load is not finite", where=f"node {node}, direction {'xyz'[axis]}")
-    n_case = 1
-    held = np.where(model.free, 0.0, model.prescribed)
-    u = np.zeros(model.n_dof) if start is None else start.u
-    slip = model.contact.no_slip(n_case) if start is None else start.contact.slip
-    first = np.zeros(model.n_dof) if start is None else _internal(model, u, slip)[0]
-    # Not the change alone: a start that is already in balance would ask for a residual below roundoff.
-    scale = max(float(np.linalg.norm(force[model.free])) for force in (load, first)) or 1.0
-    factors: list[float] = []
-    history: list[float] = []
-    state = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
-    for step in range(1, settings.steps + 1):
-        factor = step / settings.steps
-        target = first + factor * (load - first)
-        # The part of the way to the prescribed displacement that is left shrinks to nothing in the last step.
-        moved = np.where(model.free, 0.0, (held - u) / (settings.steps + 1 - step))
-        touching = start is None and step == 1
-        try:
-            u, state = _newton(model, target, moved, u, state.slip, scale, settings, history, touching)
-        except FemConvergenceError as error:
-            error.last_good = StaticState(u, state, tuple(factors), tuple(history))
-            raise
-        factors.append(factor)
-        if progress is not None:
-            progress(factor)
-    return StaticState(u, state, tuple(factors), tuple(history))
+    return _Loading(model, load, settings, start, tightened=False).run(progress)[0]
 
 
-def _internal(model: Model, u: FloatArray, slip: FloatArray) -> tuple[FloatArray, ContactState]:
-    state = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
-    force = model.elastic_force(u[:, None])[0] + model.contact.force(state.traction)
-    return force[:, 0], state
+def solve_preload(
+    model: Model, settings: StaticSettings, *, progress: Progress | None = None
+) -> tuple[Model, StaticState]:
+    """The equilibrium under ``model.load`` with all bolts tightened to their forces, and the model with bolts locked.
 
-
-def _newton(
-    model: Model,
-    load: FloatArray,
-    moved: FloatArray,
-    u: FloatArray,
-    slip: FloatArray,
-    scale: float,
-    settings: StaticSettings,
-    history: list[float],
-    touching: bool,
-) -> tuple[FloatArray, ContactState]:
-    """One load step; ``touching`` starts with all points stuck, since surfaces that just touch carry nothing yet.
-
-    The first iteration moves the supports by ``moved`` and the rest with them by the tangent, in full length.
+    The shortening of every bolt grows with the load factor so that its force does; at the end each has the force asked
+    for, whatever the others did to it. Everything after goes on with the returned model: its bolts are springs then.
+    Raises as ``solve_static``.
     """
-    force, state = _internal(model, u, slip)
-    residual = np.where(model.free, load - force, 0.0)
-    driven = bool(moved.any())
-    for iteration in range(settings.max_iterations):
-        norm = float(np.linalg.norm(residual)) / scale
-        history.append(norm)
-        driving = driven and iteration == 0
-        if norm <= settings.tolerance and not driving:
-            return u, state
-        if touching and iteration == 0:
-            contact = model.contact.stick_tangent(np.ones(model.contact.n_point, dtype=np.int64))
-        else:
-            contact = model.contact.tangent(u, slip[:, :, 0])
-        full = model.elastic_tangent(u) + contact
-        tangent = model.constrain(full)
-        solver = make_solver(settings.solver, symmetric=False)
-        solver.analyse(tangent)
-        solver.factor(tangent)
-        step = solver.solve(np.where(model.free, residual - full @ moved, moved) if driving else residual)
-        lengths = (1.0,) if driving else (1.0, 0.5, 0.25, 0.125)
-        u, residual, state = _line_search(model, load, u, slip, step, norm * scale, lengths=lengths)
-        if driving:
-            # Without loads the reactions measure the residual; a rigid motion has none and leaves what roundoff leaves.
-            roundoff = _ROUNDOFF / settings.tolerance * float(np.linalg.norm(full @ moved))
-            reaction = float(np.linalg.norm(_internal(model, u, slip)[0][~model.free]))
-            scale = max(scale if load.any() else 0.0, reaction, roundoff)
-    raise FemConvergenceError(
-        "no static equilibrium",
-        where="preload",
-        value=f"relative residual {history[-1]:.2e} after {settings.max_iterations} iterations",
-        advice="use more load steps, or check supports and gaps of the loose part",
-        history=tuple(history),
-    )
+    if not model.bolts.bolts:
+        return model, solve_static(model, model.load, settings, progress=progress)
+    state, shortening = _Loading(model, model.load, settings, None, tightened=True).run(progress)
+    return lock_bolts(model, shortening), state
 
 
-def _line_search(
-    model: Model,
-    load: FloatArray,
-    u: FloatArray,
-    slip: FloatArray,
-    step: FloatArray,
-    norm: float,
-    *,
-    lengths: tuple[float, ...],
-) -> tuple[FloatArray, FloatArray, ContactState]:
-    """Halve the step until the residual falls; keep the best of the tried lengths."""
-    best: tuple[float, FloatArray, FloatArray, ContactState] | None = None
-    for length in lengths:
-        trial = u + length * step
-        force, state = _internal(model, trial, slip)
-        residual = np.where(model.free, load - force, 0.0)
-        size = float(np.linalg.norm(residual))
-        if best is None or size < best[0]:
-            best = (size, trial, residual, state)
-        if size < norm:
-            break
-    assert best is not None
-    return best[1], best[2], best[3]
+def lock_bolts(model: Model, shortening: FloatArray) -> Model:
+    """The model with its bolts shortened by (n_bolt,) m for good: their pull joins the load."""
+    change = shortening - model.bolts.shortening
+    bolts = replace(model.bolts, shortening=np.asarray(shortening, dtype=float))
+    return replace(model, load=model.load - change @ model.bolts.pull, bolts=bolts)
+
+
+class _Loading:
+    """A path of load steps with cut-back."""
+
+    def __init__(
+        self, model: Model, load: FloatArray, settings: StaticSettings, start: StaticState | None, *, tightened: bool
+    ) -> None:
+        check_restraint(model)
+        if not np.isfinite(load).all():
+            node, axis = divmod(int(np.flatnonzero(~np.isfinite(load))[0]), 3)
+            raise FemInputError("the load is not finite", where=f"node {node}, direction {'xyz'[axis]}")
+        self._model, self._load, self._settings, self._tightened = model, load, settings, tightened
+        self._fresh = start is None
+        self._u = np.zeros(model.n_dof) if start is None else start.u
+        self._begin = self._u
+        slip = model.contact.no_slip(1) if start is None else start.contact.slip
+        self._first, self._contact = internal_force(model, self._u, slip)
+        if start is None:
+            self._first = np.zeros(model.n_dof)
+        self._shortening = model.bolts.shortening
+        wanted = model.bolts.wanted if tightened else np.zeros(0)
+        # Not the change alone: a start that is already in balance would ask for a residual below roundoff.
+        sizes = [float(np.linalg.norm(force[model.free])) for force in (load, self._first)]
+        scale = max(*sizes, float(np.linalg.norm(wanted))) or 1.0
+        self._tolerance = Tolerance(settings.tolerance, scale, settings.max_iterations, settings.solver)
+        self._dissipated = np.zeros(model.contact.n_point)
+        self._factors: list[float] = []
+
+    def run(self, progress: Progress | None) -> tuple[StaticState, FloatArray]:
+        """March the load factor to 1; the state and the shortening of the bolts there."""
+        settings, factor = self._settings, 0.0
+        increment, cuts = 1.0 / settings.steps, 0
+        while factor < 1.0:
+            # Whole steps are counted, not added up: four steps end at exactly 1.
+            whole = round((factor + increment) * settings.steps) / settings.steps
+            next_factor = min(whole if cuts == 0 else factor + increment, 1.0)
+            count = len(self._tolerance.history)
+            try:
+                self._advance(factor, next_factor)
+            except FemConvergenceError as error:
+                cuts += 1
+                increment = 0.5 * (next_factor - factor)
+                if cuts > settings.cuts:
+                    raise self._failure(error, factor) from error
+                continue
+            factor = next_factor
+            self._factors.append(factor)
+            if cuts > 0 and len(self._tolerance.history) - count <= _EASY:
+                cuts, increment = cuts - 1, 2.0 * increment
+            if progress is not None:
+                progress(factor)
+        contact = self._model.contact
+        warn_of_sliding(contact, contact.relative(self._u[:, None]), self._contact.status)
+        return self._state(), self._shortening
+
+    def _advance(self, old: float, new: float) -> None:
+        model = self._model
+        held = np.where(model.free, 0.0, self._begin + new * (model.prescribed - self._begin) - self._u)
+        target = Target(
+            self._first + new * (self._load - self._first),
+            held,
+            new * model.bolts.wanted if self._tightened else None,
+            touching=self._fresh and old == 0.0,
+        )
+        slip = self._contact.slip
+        found = LoadStep(model, target, slip, self._tolerance).solve(self._u, self._shortening)
+        self._dissipated += model.contact.dissipation_density(found.contact.traction, slip, found.contact.slip)[:, 0]
+        self._u, self._shortening, self._contact = found.u, found.shortening, found.contact
+
+    def _state(self) -> StaticState:
+        history = tuple(self._tolerance.history)
+        return StaticState(self._u, self._contact, tuple(self._factors), history, self._dissipated.copy())
+
+    def _failure(self, error: FemConvergenceError, factor: float) -> FemConvergenceError:
+        names, pair = self._model.contact.names, self._model.contact.pair
+        counts = [np.bincount(self._contact.status[pair == n, 0], minlength=3) for n in range(len(names))]
+        status = "; ".join(
+            f"{name} {c[0]} open, {c[1]} stick, {c[2]} slip" for name, c in zip(names, counts, strict=True)
+        )
+        failure = FemConvergenceError(
+            error.what,
+            where=error.where,
+            value=f"load factor {factor:.4g} reached, then {error.args[0]}; contact there: {status or 'none'}",
+            advice="use more load steps, or check supports and gaps of the loose part",
+            history=tuple(self._tolerance.history),
+        )
+        failure.last_good = self._state()
+        return failure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.arrays import FloatArray
+from fem.arrays import BoolArray, FloatArray
 from fem.errors import FemInputError
 from fem.model import Model
 
@@ -28,23 +28,39 @@ def rigid_motions(model: Model) -> FloatArray:
 
 
 def check_restraint(model: Model) -> None:
-    """Raise ``FemInputError`` that names a body which can move freely even with all interfaces closed.
+    """Raise ``FemInputError`` that names a body which can move freely even with all interfaces closed."""
+    share = loose_motion(model, np.ones(model.contact.n_point, dtype=bool))
+    if share is None:
+        return
+    advice = "add a support, a tie or a contact that holds it"
+    raise FemInputError(
+        "nothing holds a part of the structure", where=loose_bodies(model, share), value=_words(share), advice=advice
+    )
+
+
+def loose_motion(model: Model, closed: BoolArray) -> FloatArray | None:
+    """A rigid motion (n_body, 6) that supports, ties and the ``closed`` contact points (n_point,) let pass, or None.
 
     Rank of the supported rows and of B R over the rigid motions R; frictionless points resist along the normal only.
     """
     motions = rigid_motions(model)
-    contact = model.contact
-    resists = np.column_stack([np.ones(contact.n_point, dtype=bool), *([contact.law[:, 2] > 0.0] * 2)]).ravel()
-    restraint = np.vstack([motions[~model.free], (contact.operator @ motions)[resists]])
+    contact, bonds = model.contact, model.bonds
+    rough = closed & (contact.law[:, 2] > 0.0)
+    resists = np.column_stack([closed, rough, rough]).ravel()
+    parts = [motions[~model.free], (contact.operator @ motions)[resists], bonds.operator @ motions]
     # At least as many rows as columns, so that every direction of the null space has its singular value.
-    restraint = np.vstack([restraint, np.zeros((motions.shape[1], motions.shape[1]))])
+    restraint = np.vstack([*parts, np.zeros((motions.shape[1], motions.shape[1]))])
     _, size, directions = np.linalg.svd(restraint, full_matrices=False)
-    if size[-1] > _TOLERANCE * size[0]:
-        return
-    share = directions[-1].reshape(-1, 6)
+    return None if size[-1] > _TOLERANCE * size[0] else directions[-1].reshape(-1, 6)
+
+
+def loose_bodies(model: Model, share: FloatArray) -> str:
+    """Names of the bodies that move in a rigid motion (n_body, 6)."""
     part = np.linalg.norm(share, axis=1)
-    names = ", ".join(body.name for body, size in zip(model.bodies, part, strict=True) if size > 0.1 * part.max())
+    return ", ".join(body.name for body, size in zip(model.bodies, part, strict=True) if size > 0.1 * part.max())
+
+
+def _words(share: FloatArray) -> str:
+    part = np.linalg.norm(share, axis=1)
     kind, axis = divmod(int(np.abs(share[part.argmax()]).argmax()), 3)
-    motion = f"{('translate along', 'rotate about')[kind]} {'xyz'[axis]}"
-    advice = "add a support or a contact that holds it"
-    raise FemInputError("nothing holds a part of the structure", where=names, value=f"free to {motion}", advice=advice)
+    return f"free to {('translate along', 'rotate about')[kind]} {'xyz'[axis]}"

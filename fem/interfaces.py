@@ -1,0 +1,106 @@
+"""Joints between bodies by name: frictional pairs and ties, their penalties, their operators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import scipy.sparse as sp
+
+from fem.arrays import FloatArray, IntArray
+from fem.body import Body, locate
+from fem.contact import Contact, ContactLaw, contact_pair
+from fem.errors import FemInputError
+from fem.pairing import mean_size
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A frictional interface between two surfaces named "<body>.<surface>".
+
+    Attributes
+    ----------
+    friction : Coulomb coefficient.
+    normal_penalty, tangential_penalty : Pa/m; default ``stiffness`` times ``default_penalty`` of the slave.
+    stiffness : penalties in multiples of E / h. 1 adds the compliance of a layer of one facet size; 10 a tenth of it.
+    reach : largest initial distance in m at which two points are paired; default half the mean slave facet size.
+    """
+
+    name: str
+    slave: str
+    master: str
+    friction: float
+    normal_penalty: float | None = None
+    tangential_penalty: float | None = None
+    stiffness: float = 1.0
+    reach: float | None = None
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two surfaces "<body>.<surface>" bonded for good, their meshes need not match.
+
+    The bond is elastic, tau = k (u_s - u_m) in all directions and in tension too, so that it adds to the stiffness and
+    no constraint enters a solver. k = ``stiffness`` E / h unless ``penalty`` (Pa/m) is given: at the default of 100 the
+    bond is as compliant as a hundredth of a facet size of material. A distance between the surfaces is kept.
+    """
+
+    name: str
+    slave: str
+    master: str
+    penalty: float | None = None
+    stiffness: float = 100.0
+    reach: float | None = None
+
+
+def default_penalty(body: Body, facets: IntArray) -> float:
+    """k = E / h with the mean facet size h: the interface is as stiff as a layer of one facet size, Pa/m.
+
+    Its error is an extra compliance: penetration p / k, and elastic slip tau / k before real slip.
+    """
+    return body.material.young_modulus / mean_size(body.mesh.points, facets)
+
+
+def pair_contact(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, pair: Pair) -> Contact:
+    """The contact points of a pair; unknown names and surfaces that do not meet raise ``FemInputError``."""
+    default = _penalty(bodies, pair)
+    law = ContactLaw(
+        default if pair.normal_penalty is None else pair.normal_penalty,
+        default if pair.tangential_penalty is None else pair.tangential_penalty,
+        pair.friction,
+    )
+    return _joined(bodies, offsets, points, pair, law)
+
+
+def tie_bond(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, tie: Tie) -> Contact:
+    """The points of a tie with its penalty in both directions; friction plays no part."""
+    penalty = _penalty(bodies, tie) if tie.penalty is None else tie.penalty
+    return _joined(bodies, offsets, points, tie, ContactLaw(penalty, penalty, 0.0))
+
+
+def bond_stiffness(bond: Contact) -> sp.csr_matrix:
+    """B' w k B of points that never open or slip, (n_dof, n_dof) N/m."""
+    blocks = sp.diags((bond.area[:, None] * bond.law[:, [0, 1, 1]]).ravel())
+    return (bond.operator.T @ blocks @ bond.operator).tocsr()
+
+
+def _penalty(bodies: Sequence[Body], joint: Pair | Tie) -> float:
+    if not joint.stiffness > 0.0:
+        raise FemInputError("stiffness must be positive", where=f"joint {joint.name}", value=joint.stiffness)
+    index, slave = locate(bodies, joint.slave)
+    return joint.stiffness * default_penalty(bodies[index], bodies[index].mesh.surface(slave))
+
+
+def _joined(
+    bodies: Sequence[Body], offsets: IntArray, points: FloatArray, joint: Pair | Tie, law: ContactLaw
+) -> Contact:
+    s, slave = locate(bodies, joint.slave)
+    m, master = locate(bodies, joint.master)
+    return contact_pair(
+        joint.name,
+        points,
+        bodies[s].mesh.surface(slave) + offsets[s],
+        bodies[m].mesh.surface(master) + offsets[m],
+        law,
+        reach=joint.reach,
+    )

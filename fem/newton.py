@@ -1,0 +1,187 @@
+"""Newton's method for one load step: bodies, contact with friction, moved supports, bolts being tightened.
+
+Unknown are u (m) and, while bolts are tightened, their shortening delta (m):
+
+    f_int(u) + f_contact(u, s_p) + Q' delta = p,    Q u + S delta = F
+
+with the force Q u + S delta of every bolt section (``fem.bolt``). The tangent is consistent and unsymmetric in
+slip; the step is solved by elimination of delta and halved while the residual does not fall.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from fem.arrays import FloatArray
+from fem.contact import ContactState
+from fem.errors import FemConvergenceError, FemInputError
+from fem.linear_solver import make_solver
+from fem.model import Model
+from fem.rigid_motion import loose_bodies, loose_motion
+
+_ROUNDOFF = 1e-14
+"""Share of the forces inside a body that cancellation leaves in its residual."""
+
+_CLOSING_STEPS = 4
+"""Attempts to bring surfaces together that must hold a loose body, before the interface counts as one that opens."""
+
+
+@dataclass
+class Tolerance:
+    """Relative residual, the force in N that it is relative to, iterations per load step, linear solver by name."""
+
+    residual: float
+    scale: float
+    max_iterations: int
+    solver: str
+    history: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a load step leads: load (n_dof,) N, motion of the supports (n_dof,) m, bolt forces (n_bolt,) N.
+
+    ``bolts`` None keeps the shortening locked. ``touching`` starts with all points closed and stuck, since surfaces
+    that just touch or that a gap divides carry nothing yet.
+    """
+
+    load: FloatArray
+    moved: FloatArray
+    bolts: FloatArray | None
+    touching: bool
+
+
+@dataclass(frozen=True)
+class Point:
+    """One iterate: u (n_dof,), delta (n_bolt,), contact, residuals of the nodes (n_dof,) and bolts (n_bolt,) in N."""
+
+    u: FloatArray
+    shortening: FloatArray
+    contact: ContactState
+    residual: FloatArray
+    bolt_residual: FloatArray
+
+    @property
+    def size(self) -> float:
+        """Norm of both residuals, N."""
+        return float(np.sqrt(self.residual @ self.residual + self.bolt_residual @ self.bolt_residual))
+
+
+def internal_force(model: Model, u: FloatArray, slip: FloatArray) -> tuple[FloatArray, ContactState]:
+    """Force of bodies, ties and contact at u (n_dof,) with the slip history (n_point, 2, 1), and the contact there."""
+    state = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
+    force = model.elastic_force(u[:, None])[0] + model.contact.force(state.traction)
+    return force[:, 0], state
+
+
+class LoadStep:
+    """One load step of a model from a displacement, a shortening of the bolts and a slip history."""
+
+    def __init__(self, model: Model, target: Target, slip: FloatArray, tolerance: Tolerance) -> None:
+        self.model, self.target, self._slip, self._tolerance = model, target, slip, tolerance
+        self._closing = 0
+
+    def solve(self, u: FloatArray, shortening: FloatArray) -> Point:
+        """Iterate from u (n_dof,) and shortening (n_bolt,) to balance.
+
+        No convergence raises ``FemConvergenceError``; an interface that must hold a body but opens, ``FemInputError``.
+        """
+        limit = self._tolerance
+        point = self._at(u, shortening)
+        driven = bool(self.target.moved.any())
+        for iteration in range(limit.max_iterations):
+            driving = driven and iteration == 0
+            norm = point.size / limit.scale
+            limit.history.append(norm)
+            if norm <= limit.residual and not driving:
+                return point
+            if not np.isfinite(norm):
+                break
+            point = self._iterate(point, driving=driving, closing=self._must_close(point, iteration))
+        raise FemConvergenceError(
+            "no static equilibrium",
+            where="preload",
+            value=f"relative residual {limit.history[-1]:.2e} after {limit.max_iterations} iterations",
+            history=tuple(limit.history),
+        )
+
+    def _at(self, u: FloatArray, shortening: FloatArray) -> Point:
+        model, target = self.model, self.target
+        force, state = internal_force(model, u, self._slip)
+        if target.bolts is None:
+            return Point(u, shortening, state, np.where(model.free, target.load - force, 0.0), np.empty(0))
+        bolts = model.bolts
+        residual = np.where(model.free, target.load - force - shortening @ bolts.pull, 0.0)
+        miss = target.bolts - bolts.pull @ u - bolts.stiffness * shortening
+        return Point(u, shortening, state, residual, miss)
+
+    def _must_close(self, point: Point, iteration: int) -> bool:
+        """Whether to draw all points together: at the first touch, or where open surfaces leave a body loose."""
+        if self.target.touching and iteration == 0:
+            return True
+        contact = self.model.contact
+        closed = point.contact.status[:, 0] > 0
+        if all(closed[contact.pair == number].any() for number in range(len(contact.names))):
+            return False
+        share = loose_motion(self.model, closed)
+        if share is None:
+            return False
+        self._closing += 1
+        if self._closing > _CLOSING_STEPS:
+            open_pairs = [name for n, name in enumerate(contact.names) if not closed[contact.pair == n].any()]
+            advice = "check the direction of the loads, the initial gaps and that the surfaces meet"
+            where = f"contact {', '.join(open_pairs)}"
+            value = f"{loose_bodies(self.model, share)} free"
+            raise FemInputError("the interface never closes", where=where, value=value, advice=advice)
+        return True
+
+    def _iterate(self, point: Point, *, driving: bool, closing: bool) -> Point:
+        model, moved = self.model, self.target.moved
+        residual = point.residual
+        if closing:
+            contact = model.contact.stick_tangent(np.ones(model.contact.n_point, dtype=np.int64))
+            bilateral = model.contact.bilateral_traction(model.contact.operator @ point.u, self._slip[:, :, 0])
+            pull = model.contact.force(bilateral[:, None] - point.contact.traction)[:, 0]
+            residual = np.where(model.free, residual - pull, 0.0)
+        else:
+            contact = model.contact.tangent(point.u, self._slip[:, :, 0])
+        full = model.elastic_tangent(point.u) + contact
+        right = np.where(model.free, residual - full @ moved, moved) if driving else residual
+        du, dd = self._direction(full, right, point.bolt_residual)
+        # Moving supports and closing surfaces is not judged by the residual: both pass through states out of balance.
+        lengths = (1.0,) if driving or closing else (1.0, 0.5, 0.25, 0.125)
+        best: Point | None = None
+        for length in lengths:
+            trial = self._at(point.u + length * du, point.shortening + length * dd)
+            if best is None or trial.size < best.size:
+                best = trial
+            if trial.size < point.size:
+                break
+        assert best is not None
+        if driving:
+            self._rescale(best, full @ moved)
+        return best
+
+    def _direction(self, full: sp.csr_matrix, right: FloatArray, miss: FloatArray) -> tuple[FloatArray, FloatArray]:
+        tangent = self.model.constrain(full)
+        solver = make_solver(self._tolerance.solver, symmetric=False)
+        solver.analyse(tangent)
+        solver.factor(tangent)
+        if self.target.bolts is None:
+            return solver.solve(right), np.zeros(len(self.model.bolts.bolts))
+        bolts = self.model.bolts
+        pull = np.where(self.model.free, bolts.pull, 0.0)
+        solution = solver.solve(np.column_stack([right, pull.T]))
+        compliance = np.diag(bolts.stiffness) - bolts.pull @ solution[:, 1:]
+        dd = np.linalg.solve(compliance, miss - bolts.pull @ solution[:, 0])
+        return np.asarray(solution[:, 0] - solution[:, 1:] @ dd), np.asarray(dd)
+
+    def _rescale(self, point: Point, forces: FloatArray) -> None:
+        """Without loads the reactions measure the residual; a rigid motion has none and leaves what roundoff leaves."""
+        limit, free = self._tolerance, self.model.free
+        roundoff = _ROUNDOFF / limit.residual * float(np.linalg.norm(forces))
+        reaction = float(np.linalg.norm(internal_force(self.model, point.u, self._slip)[0][~free]))
+        limit.scale = max(limit.scale if self.target.load.any() else 0.0, reaction, roundoff)
