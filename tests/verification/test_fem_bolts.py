@@ -1,0 +1,163 @@
+"""Bolts: V12 joint diagram, torque formula, curved cuts, loads that a bolt must survive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from fem.block import graded, hex_block
+from fem.bolt import Bolt
+from fem.equilibrium import interface_states
+from fem.errors import FemInputError
+from fem.loads import Force
+from fem.material import Material
+from fem.mesh import Mesh
+from fem.model import Body, Model, Pair, Support, Tie, build_model
+from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
+from fem.tightening import bolt_force
+from tests.fem.small_models import tetrahedra
+
+E, LENGTH, WIDTH, F0 = 200e9, 0.04, 0.01, 9.1e3
+SOFT = Material(E, 0.0, 7800.0)
+RIGID = Material(1e6 * E, 0.0, 7800.0)
+"""Ends a million times stiffer than the stack: they bend by 1e-6 of what the bolt stretches."""
+
+SETTINGS = StaticSettings(steps=2, solver="superlu")
+
+
+def _block(x: tuple[float, float], y: tuple[float, float], cells: tuple[int, int]) -> Mesh:
+    lines = [graded(list(interval), [n]) for interval, n in ((x, cells[0]), (y, cells[1]), ((0.0, WIDTH), 1))]
+    return hex_block(*lines)
+
+
+def _joint(pull: float = 0.0, *, shank: Mesh | None = None, section: float = 0.021) -> Model:
+    """A shank of area A and a sleeve of 3 A between a rigid base and a rigid head that ``pull`` N lifts."""
+    shank = shank or _block((0.0, WIDTH), (0.0, LENGTH), (1, 4))
+    bodies = [
+        Body("base", _block((0.0, WIDTH), (-0.01, 0.0), (1, 1)), RIGID, "linear"),
+        Body("shank", shank, SOFT, "linear"),
+        Body("sleeve", _block((WIDTH, 4 * WIDTH), (0.0, LENGTH), (3, 3)), SOFT, "linear"),
+        Body("head", _block((0.0, 4 * WIDTH), (LENGTH, LENGTH + 0.01), (1, 1)), RIGID, "linear"),
+    ]
+    return build_model(
+        bodies,
+        pairs=[Pair("under_head", "sleeve.y_max", "head.y_min", 0.2, stiffness=1e3)],
+        ties=[
+            Tie("thread", "shank.y_min", "base.y_max", stiffness=1e3),
+            Tie("neck", "shank.y_max", "head.y_min", stiffness=1e3),
+        ],
+        bolts=[Bolt("bolt", "shank", F0, section=section)],
+        supports=[
+            Support("base.skin", ("x", "y", "z")),
+            Support("sleeve.y_min", ("y",)),
+            *[Support(f"{body}.skin", ("x", "z")) for body in ("shank", "sleeve", "head")],
+        ],
+        loads=[Force("pull", "head.y_max", (0.0, pull, 0.0))],
+    )
+
+
+@dataclass(frozen=True)
+class Tightened:
+    """The joint with its bolt locked at F0, no load."""
+
+    model: Model
+    state: StaticState
+
+    def under(self, pull: float) -> tuple[float, float]:
+        """Bolt force and interface force in N under a pull."""
+        load = self.model.load + _joint(pull).load
+        settings = StaticSettings(steps=1, solver="superlu")
+        state = solve_static(self.model, load, settings, start=self.state)
+        interface = interface_states(self.model, state.u, state.contact)[0]
+        return float(self.model.bolts.forces(state.u)[0]), interface.normal_force
+
+
+@pytest.fixture(scope="module")
+def tightened() -> Tightened:
+    return Tightened(*solve_preload(_joint(), SETTINGS))
+
+
+def _bolt_share() -> float:
+    """C = k_b / (k_b + k_m) with the penalties: two ties and the section lengthen the bolt, one contact the sleeve."""
+    bolt = 1.0 / (LENGTH + 3e-3 * WIDTH)
+    sleeve = 3.0 / (LENGTH + 1e-3 * WIDTH)
+    return bolt / (bolt + sleeve)
+
+
+def test_v12_tightening_reaches_the_force(tightened: Tightened) -> None:
+    """V12: at zero load bolt and interface carry F0 = 9.1 kN; 1e-6 (manual). The bolt shortens by F0/k_b + F0/k_m."""
+    force, interface = tightened.under(0.0)
+    assert force == pytest.approx(F0, rel=1e-6)
+    assert interface == pytest.approx(F0, rel=1e-6)
+    lengths = LENGTH + 3e-3 * WIDTH + (LENGTH + 1e-3 * WIDTH) / 3.0
+    assert tightened.model.bolts.shortening[0] == pytest.approx(F0 * lengths / (E * WIDTH**2), rel=2e-6)
+
+
+@pytest.mark.parametrize("pull", [2e3, 6e3, 10e3, 12.1e3])
+def test_v12_bolt_takes_its_share_of_the_load(tightened: Tightened, pull: float) -> None:
+    """V12: bolt force F0 + C P, interface F0 - (1 - C) P; C = 1/4 to F/k_p (2.5e-3 of C), exact with the penalties."""
+    force, interface = tightened.under(pull)
+    share = _bolt_share()
+    assert share == pytest.approx(0.25, rel=2.5e-3)
+    # 1e-6 of the manual and the ends, which bend by 1e-6.
+    assert force == pytest.approx(F0 + share * pull, rel=2e-6)
+    assert interface == pytest.approx(F0 - (1.0 - share) * pull, abs=2e-6 * F0)
+
+
+def test_v12_joint_opens_where_it_should_and_the_bolt_then_carries_all(tightened: Tightened) -> None:
+    """V12: separation at P = F0/(1 - C) = 12.133 kN (to F/k_p: 1e-3), above it bolt force = P; 1e-6 (manual)."""
+    opening = F0 / (1.0 - _bolt_share())
+    assert opening == pytest.approx(12.133e3, rel=1e-3)
+    assert tightened.under(opening * (1.0 - 1e-4))[1] > 0.0
+    for pull in (opening * (1.0 + 1e-4), 15e3):
+        force, interface = tightened.under(pull)
+        assert interface == 0.0
+        assert force == pytest.approx(pull, rel=1e-6)
+
+
+def test_a_cut_along_the_faces_of_tetrahedra_tightens_as_well() -> None:
+    """The section of a tetrahedral shank is no plane; the force along the axis is the same."""
+    model = _joint(shank=tetrahedra(_block((0.0, WIDTH), (0.0, LENGTH), (1, 4))), section=0.0251)
+    section = model.facets("shank.section_head")
+    assert np.ptp(model.points[section][:, :, 1]) > 1e-3
+    locked, state = solve_preload(model, SETTINGS)
+    assert locked.bolts.forces(state.u)[0] == pytest.approx(F0, rel=1e-6)
+    assert interface_states(locked, state.u, state.contact)[0].normal_force == pytest.approx(F0, rel=1e-6)
+
+
+def test_locking_again_restores_the_equilibrium(tightened: Tightened) -> None:
+    """A model built anew and locked at the recorded shortening is in balance with the recorded state."""
+    again = lock_bolts(_joint(), tightened.model.bolts.shortening)
+    state = solve_static(again, again.load, SETTINGS, start=tightened.state)
+    # Both steps start within the tolerance: nothing is left to iterate.
+    assert len(state.residuals) == 2
+
+
+def test_torque_formula_gives_what_its_printed_numbers_give() -> None:
+    """T = 10.1 N m, P = 1 mm, d2 = 6 mm, D_f = 8 mm, both friction coefficients 0.2: 6111.6 N, not 9.1 kN."""
+    assert bolt_force(10.1, 1e-3, (6e-3, 8e-3), (0.2, 0.2)) == pytest.approx(6111.6, abs=0.05)
+
+
+def test_torque_formula_refuses_nonsense() -> None:
+    with pytest.raises(FemInputError, match="torque"):
+        bolt_force(-1.0, 1e-3, (6e-3, 8e-3), (0.2, 0.2))
+
+
+@pytest.mark.parametrize(
+    ("bolt", "message"),
+    [
+        (Bolt("b", "nut", F0), "unknown body"),
+        (Bolt("b", "shank", F0, section=1.0), "misses the shank"),
+    ],
+)
+def test_bolts_that_cannot_be_built_say_why(bolt: Bolt, message: str) -> None:
+    with pytest.raises(FemInputError, match=message):
+        build_model([Body("shank", _block((0.0, WIDTH), (0.0, LENGTH), (1, 4)), SOFT)], bolts=[bolt])
+
+
+@pytest.mark.parametrize(("force", "axis"), [(-1.0, "y"), (float("nan"), "y"), (1.0, "r")])
+def test_bolts_out_of_range_are_refused(force: float, axis: str) -> None:
+    with pytest.raises(FemInputError, match="bolt b"):
+        Bolt("b", "shank", force, axis)
