@@ -5,9 +5,7 @@ from __future__ import annotations
 from fem.errors import FemInputError
 
 
-def bolt_force(
-    torque: float, pitch: float, diameters: tuple[float, float], friction: tuple[float, float]
-) -> float:
+def bolt_force(torque: float, pitch: float, diameters: tuple[float, float], friction: tuple[float, float]) -> float:
     """F = T / (0.159 P + 0.578 d_2 mu_T + 0.5 D_f mu_H) in N.
 
     Parameters
