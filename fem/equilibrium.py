@@ -17,8 +17,10 @@ class InterfaceState:
     """One contact pair at one state.
 
     ``point`` selects its points among all contact points; pressure, gap (n,) and traction (n, 2) in SI units; status
-    (n,); ``normal_force`` is the resultant of the pressure and ``applied_force`` what the loads send through the pair,
-    nan where supports on both sides leave that open; ``contact_area`` is the area of the closed points.
+    (n,) 0 open, 1 stick, 2 slip; slip (n, 2) m, where the springs of stick are anchored; dissipated (n,) work of
+    friction per area in J/m^2, nan where it was not kept. ``normal_force`` is the resultant of the pressure, ``force``
+    (3,) that of all tractions on the master, ``applied_force`` what the loads send through the pair, nan where supports
+    on both sides or a bolt leave that open; ``contact_area`` is the area of the closed points.
     """
 
     name: str
@@ -27,16 +29,22 @@ class InterfaceState:
     traction: FloatArray
     gap: FloatArray
     status: IntArray
+    slip: FloatArray
+    dissipated: FloatArray
+    force: FloatArray
     normal_force: float
     applied_force: float
     contact_area: float
 
 
-def interface_states(model: Model, u: FloatArray, state: ContactState, case: int = 0) -> tuple[InterfaceState, ...]:
-    """The state of every pair at u (n_dof,)."""
+def interface_states(
+    model: Model, u: FloatArray, state: ContactState, case: int = 0, *, dissipated: FloatArray | None = None
+) -> tuple[InterfaceState, ...]:
+    """The state of every pair at u (n_dof,); ``dissipated`` (n_point,) J/m^2 as the way to it has left it."""
     contact = model.contact
     gap = contact.initial_gap + (contact.operator @ u)[::3]
     traction = state.traction[:, case].reshape(-1, 3)
+    work = np.full(contact.n_point, np.nan) if dissipated is None else dissipated
     result = []
     for number, name in enumerate(contact.names):
         point = np.flatnonzero(contact.pair == number)
@@ -50,6 +58,9 @@ def interface_states(model: Model, u: FloatArray, state: ContactState, case: int
                 traction[point, 1:],
                 gap[point],
                 status,
+                state.slip[point, :, case],
+                work[point],
+                np.einsum("g,gi,gij->j", area, traction[point], contact.frame[point]),
                 float(pressure @ area),
                 applied_force(model, number),
                 float(area[status > 0].sum()),

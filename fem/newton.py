@@ -4,8 +4,9 @@ Unknown are u (m) and, while bolts are tightened, their shortening delta (m):
 
     f_int(u) + f_contact(u, s_p) + Q' delta = p,    Q u + S delta = F
 
-with the force Q u + S delta of every bolt section (``fem.bolt``). The tangent is consistent and unsymmetric in
-slip; the step is solved by elimination of delta and halved while the residual does not fall.
+with the force Q u + S delta of every bolt section (``fem.bolt``). The tangent is consistent and unsymmetric in slip; the
+step is solved by elimination of delta. Whole steps come first; where they do not converge, the load step is tried again
+with steps that are halved while the residual does not fall.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ from fem.rigid_motion import loose_bodies, loose_motion
 
 _ROUNDOFF = 1e-14
 """Share of the forces inside a body that cancellation leaves in its residual."""
+
+_LENGTHS = (1.0, 0.5, 0.25, 0.125)
+"""Lengths of the second attempt. The first takes whole steps: where a thin part turns, its membrane force makes the
+residual grow before it falls, and halving by it would creep (14 iterations instead of 4 on a clamped strip)."""
 
 _CLOSING_STEPS = 4
 """Attempts to bring surfaces together that must hold a loose body, before the interface counts as one that opens."""
@@ -89,6 +94,18 @@ class LoadStep:
 
         No convergence raises ``FemConvergenceError``; an interface that must hold a body but opens, ``FemInputError``.
         """
+        found = self._newton(u, shortening, (1.0,)) or self._newton(u, shortening, _LENGTHS)
+        if found is not None:
+            return found
+        limit = self._tolerance
+        raise FemConvergenceError(
+            "no static equilibrium",
+            where="preload",
+            value=f"relative residual {limit.history[-1]:.2e} after {limit.max_iterations} iterations",
+            history=tuple(limit.history),
+        )
+
+    def _newton(self, u: FloatArray, shortening: FloatArray, lengths: tuple[float, ...]) -> Point | None:
         limit = self._tolerance
         point = self._at(u, shortening)
         driven = bool(self.target.moved.any())
@@ -99,14 +116,12 @@ class LoadStep:
             if norm <= limit.residual and not driving:
                 return point
             if not np.isfinite(norm):
-                break
-            point = self._iterate(point, driving=driving, closing=self._must_close(point, iteration))
-        raise FemConvergenceError(
-            "no static equilibrium",
-            where="preload",
-            value=f"relative residual {limit.history[-1]:.2e} after {limit.max_iterations} iterations",
-            history=tuple(limit.history),
-        )
+                return None
+            closing = self._must_close(point, iteration)
+            # Moving supports and closing surfaces pass through states out of balance: no judging by the residual.
+            tried = (1.0,) if driving or closing else lengths
+            point = self._iterate(point, tried, driving=driving, closing=closing)
+        return None
 
     def _at(self, u: FloatArray, shortening: FloatArray) -> Point:
         model, target = self.model, self.target
@@ -138,7 +153,7 @@ class LoadStep:
             raise FemInputError("the interface never closes", where=where, value=value, advice=advice)
         return True
 
-    def _iterate(self, point: Point, *, driving: bool, closing: bool) -> Point:
+    def _iterate(self, point: Point, lengths: tuple[float, ...], *, driving: bool, closing: bool) -> Point:
         model, moved = self.model, self.target.moved
         residual = point.residual
         if closing:
@@ -151,8 +166,6 @@ class LoadStep:
         full = model.elastic_tangent(point.u) + contact
         right = np.where(model.free, residual - full @ moved, moved) if driving else residual
         du, dd = self._direction(full, right, point.bolt_residual)
-        # Moving supports and closing surfaces is not judged by the residual: both pass through states out of balance.
-        lengths = (1.0,) if driving or closing else (1.0, 0.5, 0.25, 0.125)
         best: Point | None = None
         for length in lengths:
             trial = self._at(point.u + length * du, point.shortening + length * dd)
