@@ -4,9 +4,9 @@ Unknown are u (m) and, while bolts are tightened, their shortening delta (m):
 
     f_int(u) + f_contact(u, s_p) + Q' delta = p,    Q u + S delta = F
 
-with the force Q u + S delta of every bolt section (``fem.bolt``). The tangent is consistent and unsymmetric in slip; the
-step is solved by elimination of delta. Whole steps come first; where they do not converge, the load step is tried again
-with steps that are halved while the residual does not fall.
+with the force Q u + S delta of every bolt section (``fem.bolt``). The tangent is consistent and unsymmetric in slip;
+delta is eliminated. Whole steps come first; where they do not converge, the load step is tried again with steps that
+are halved while the residual does not fall.
 """
 
 from __future__ import annotations

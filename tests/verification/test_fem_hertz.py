@@ -21,7 +21,7 @@ THICKNESS = 2e-3
 
 @dataclass(frozen=True)
 class Line:
-    """Two cylinders (m; infinite: a plane), Young moduli (Pa), Poisson ratios, force per length (N/m), a (m), p0 (Pa)."""
+    """Radii (m; infinite: a plane), Young moduli (Pa), Poisson ratios, force per length (N/m), a (m), p0 (Pa)."""
 
     radii: tuple[float, float]
     young: tuple[float, float]
