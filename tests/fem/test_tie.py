@@ -12,15 +12,13 @@ from fem.mesh import Mesh
 from fem.model import Body, Model, Support, Tie, build_model
 from fem.modes import solve_modes
 from fem.preload import StaticSettings, solve_static
-from tests.fem.small_models import STEEL, box, tetrahedra
+from tests.fem.small_models import STEEL, box
 
 SETTINGS = StaticSettings(steps=1, solver="superlu")
 
 
 def _pair(element: str, cells: tuple[int, int]) -> tuple[Mesh, Mesh]:
     n, m = cells
-    if element == "tet10":
-        return tetrahedra(box((1.0, 1.0, 1.0), (m, 1, m))), tetrahedra(box((1.0, 1.0, 1.0), (n, 1, n), shift=1.0))
     return box((1.0, 1.0, 1.0), (m, 1, m), element), box((1.0, 1.0, 1.0), (n, 1, n), element, shift=1.0)
 
 
