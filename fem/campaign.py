@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,22 @@ from fem.motion import MotionState, StepRecord
 from fem.preload import Progress, StaticState
 from fem.snap_back import hold_modes
 from fem.transient import Transient
+
+
+class Marching(Protocol):
+    """What a campaign needs of a time scheme: ``Transient`` or ``ExplicitTransient``."""
+
+    equilibrium: StaticState
+    rest_energies: FloatArray
+
+    def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
+        """State at t = 0."""
+
+    def observe(self, state: MotionState) -> StepRecord:
+        """Record of a state that no step led to."""
+
+    def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
+        """Records of the next outputs."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +130,7 @@ def snap_back_starts(
 
 
 def march_campaign(
-    transient: Transient,
+    transient: Marching,
     observation: Observation,
     n_step: int,
     segment_steps: int,
@@ -161,7 +177,7 @@ class _Row:
     snapshot: npt.NDArray[np.float32] | None
 
 
-def _observe(record: StepRecord, transient: Transient, observation: Observation) -> _Row:
+def _observe(record: StepRecord, transient: Marching, observation: Observation) -> _Row:
     modes, sensors, state = observation.modes, observation.sensors, record.state
     moved = state.u - transient.equilibrium.u[:, None]
     fields = (

@@ -96,6 +96,13 @@ def solve_modes(
     return ModalBasis(omega, np.ascontiguousarray(shapes), np.asarray(mass @ shapes), elastic, material)
 
 
+def no_modes(model: Model, state: StaticState) -> ModalBasis:
+    """A basis of no modes, for transients that correct no dispersion; bodies need not be held."""
+    empty = np.zeros((model.n_dof, 0))
+    tangents = (model.elastic_tangent(state.u), model.elastic_tangent(state.u, geometric=False))
+    return ModalBasis(np.zeros(0), empty, empty, *tangents)
+
+
 def rayleigh(modes: ModalBasis, which: tuple[int, int], ratios: tuple[float, float]) -> Rayleigh:
     """alpha and beta that give two modes (numbered from 0) their damping ratios.
 

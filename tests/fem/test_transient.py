@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -11,18 +14,17 @@ from fem.modes import Rayleigh, solve_modes
 from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, solve_static
 from fem.transient import Transient, TransientSettings
+from fem.viscous_tangent import viscous_stiffness
 from tests.fem.conftest import Strip
-from tests.fem.small_models import box, single
+from tests.fem.small_models import box, distorted, single, wave
 
 STEP = 5e-5
 
 
-def make_transient(strip: Strip, max_iterations: int = 60) -> Transient:
+def make_transient(strip: Strip, **options: object) -> Transient:
     """A transient of the strip for motions of about 1 mm in its first mode."""
     scale = float(np.linalg.norm(strip.modes.left[:, 0] * strip.modes.omega[0] ** 2 * strip.eta))
-    settings = TransientSettings(
-        STEP, tolerance=1e-7, max_iterations=max_iterations, corrected_modes=1, solver="superlu"
-    )
+    settings = replace(TransientSettings(STEP, tolerance=1e-7, corrected_modes=1, solver="superlu"), **options)
     return Transient(strip.model, strip.equilibrium, strip.modes, strip.damping, settings, force_scale=scale)
 
 
@@ -88,6 +90,53 @@ def test_steps_equal_a_full_newton_reference(strip: Strip) -> None:
         slipping += int((record.contact.status == 2).sum())
         state = record.state
     assert slipping > 0, "the case should slip"
+
+
+def test_fast_path_and_full_newton_give_the_same_trajectory(strip: Strip) -> None:
+    """60 steps, slipping: the paths part by the tolerance of every step, at worst with the square of their number."""
+    fast = make_transient(strip)
+    newton = make_transient(strip, method="newton")
+    motion, iterations = [], []
+    for transient in (fast, newton):
+        records = list(transient.march(released(strip, transient), 60))
+        motion.append(np.array([r.state.u[:, 0] for r in records]))
+        iterations.append(np.mean([r.iterations[0] for r in records]))
+        assert sum((r.contact.status == 2).sum() for r in records) > 0, "the case should slip"
+    moved = np.abs(strip.held.u - strip.equilibrium.u).max()
+    np.testing.assert_allclose(motion[0], motion[1], atol=0.5 * 60**2 * 1e-7 * moved)
+    assert iterations[1] < 0.5 * iterations[0]
+
+
+def test_newton_contracts_quadratically(strip: Strip) -> None:
+    """Once it slips no more differently: r_(k+1) < 10 r_k^2 between 1e-1 and roundoff, 1e-9."""
+    transient = make_transient(strip, method="newton", tolerance=1e-9, max_iterations=8)
+    seen: list[float] = []
+    size = transient._corrector.size
+
+    def watched(residual: np.ndarray) -> np.ndarray:
+        found = size(residual)
+        seen.append(float(found[0]))
+        return found
+
+    transient._corrector.size = watched  # type: ignore[method-assign]
+    list(transient.march(released(strip, transient), 3))
+    pairs = [(a, b) for a, b in pairwise(seen) if b < a < 0.1]
+    assert len(pairs) >= 3
+    assert all(b < 10.0 * a**2 + 1e-9 for a, b in pairs)
+
+
+def test_viscous_tangent_is_the_derivative_of_the_viscous_force() -> None:
+    """Central differences of a polynomial of third order in u: exact but for roundoff."""
+    model = single(distorted(box((1.0, 1.0, 1.0), (1, 1, 1)), 0.05))
+    u, v = wave(model.points, 0.1), wave(model.points[:, ::-1], 3.0)
+    tangent = viscous_stiffness(model, u, v, 0.01)
+    direction, step = np.random.default_rng(0).normal(size=model.n_dof), 1e-4
+
+    def viscous(x: np.ndarray) -> np.ndarray:
+        return np.asarray(model.body_forces(x[:, None], v[:, None], 0.01)[1][:, 0])
+
+    slope = (viscous(u + step * direction) - viscous(u - step * direction)) / (2.0 * step)
+    np.testing.assert_allclose(tangent @ direction, slope, atol=1e-6 * np.abs(slope).max())
 
 
 def test_equilibrium_stays_at_rest(strip: Strip) -> None:
@@ -157,7 +206,7 @@ def test_static_base_acceleration_is_gravity() -> None:
 
 
 def test_step_that_does_not_converge_has_history(strip: Strip) -> None:
-    transient = make_transient(strip, max_iterations=2)
+    transient = make_transient(strip, max_iterations=2, max_cutbacks=0)
     good: list[StepRecord] = []
     with pytest.raises(FemConvergenceError, match=r"step 1: .*smaller time step") as caught:
         good.extend(transient.march(released(strip, transient), 3))
