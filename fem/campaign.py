@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
+from fem.central_difference import ExplicitTransient
 from fem.errors import FemError, FemInputError
 from fem.modes import ModalBasis
 from fem.motion import MotionState, StepRecord
@@ -115,7 +116,11 @@ def moving_starts(equilibrium: StaticState, displacement: FloatArray, velocity: 
 
 
 def snap_back_starts(
-    transient: Transient, modes: ModalBasis, etas: Sequence[FloatArray], *, progress: Progress | None = None
+    transient: Transient | ExplicitTransient,
+    modes: ModalBasis,
+    etas: Sequence[FloatArray],
+    *,
+    progress: Progress | None = None,
 ) -> Starts:
     """Static states with the wanted modal coordinates, see ``hold_modes``."""
     states = []

@@ -16,6 +16,7 @@ from fem.campaign import (
     moving_starts,
     snap_back_starts,
 )
+from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.modes import ModalBasis, Rayleigh
 from fem.transient import Transient, TransientSettings
 from romgen.arrays import FloatArray
@@ -24,7 +25,7 @@ from romgen.errors import InputError
 from romgen.fe_stages import build, equilibrium, translated
 from romgen.forced_motion import ForcedMotion
 from romgen.settings import RingDownSettings, Study
-from romgen.structure import EnergyLedger, Modes, Preload, RingDown
+from romgen.structure import EnergyLedger, Modes, Preload, RingDown, StepEffort
 from romgen.trajectory import Trajectory
 
 Segment = CampaignSegment
@@ -71,7 +72,7 @@ def march_forced(
 
 def _transient(
     study: Study, preload: Preload, modes: Modes, base: Callable[[float], FloatArray] | None = None
-) -> tuple[Transient, ModalBasis]:
+) -> tuple[Transient | ExplicitTransient, ModalBasis]:
     """The model of a study ready to march by the table [ringdowns], and its modes."""
     table = _ringdowns(study)
     model = build(study)
@@ -79,6 +80,12 @@ def _transient(
     omega = 2.0 * np.pi * modes.frequency_hz
     tangents = (model.elastic_tangent(state.u), model.elastic_tangent(state.u, geometric=False))
     basis = ModalBasis(omega, modes.shapes, modes.left, *tangents)
+    damping = Rayleigh(modes.alpha, modes.beta)
+    direction = "y" if study.base_acceleration is None else study.base_acceleration.direction
+    if table.scheme == "central_difference":
+        explicit = ExplicitSettings(table.time_step, table.explicit_step)
+        march = ExplicitTransient(model, state, damping, explicit, base_acceleration=base, base_direction=direction)
+        return march, basis
     etas = _start_coordinates(study, basis)
     count = len(etas[0])
     inertia = [np.linalg.norm(modes.left[:, :count] @ (omega[:count] ** 2 * eta)) for eta in etas]
@@ -86,13 +93,28 @@ def _transient(
         model,
         state,
         basis,
-        Rayleigh(modes.alpha, modes.beta),
-        TransientSettings(table.time_step, table.spectral_radius, table.tolerance, corrected_modes=count),
+        damping,
+        _implicit_settings(table, count),
         force_scale=float(max(inertia)),
         base_acceleration=base,
-        base_direction="y" if study.base_acceleration is None else study.base_acceleration.direction,
+        base_direction=direction,
     )
     return transient, basis
+
+
+def _implicit_settings(table: RingDownSettings, corrected_modes: int) -> TransientSettings:
+    return TransientSettings(
+        table.time_step,
+        table.spectral_radius,
+        table.tolerance,
+        table.max_iterations,
+        corrected_modes=corrected_modes,
+        method=table.method,
+        refactor_above=table.refactor_above,
+        max_cutbacks=table.max_cutbacks,
+        error_tolerance=table.error_tolerance,
+        max_doublings=table.max_doublings,
+    )
 
 
 def _ringdowns(study: Study) -> RingDownSettings:
@@ -112,7 +134,12 @@ def _start_coordinates(study: Study, basis: ModalBasis) -> list[FloatArray]:
     return etas
 
 
-def _starts(table: RingDownSettings, transient: Transient, basis: ModalBasis, etas: Sequence[FloatArray]) -> Starts:
+def _starts(
+    table: RingDownSettings,
+    transient: Transient | ExplicitTransient,
+    basis: ModalBasis,
+    etas: Sequence[FloatArray],
+) -> Starts:
     if table.start == "static":
         return snap_back_starts(transient, basis, etas)
     return modal_starts(basis, transient.equilibrium, etas)
@@ -153,7 +180,9 @@ def _ringdown(segments: Sequence[CampaignSegment], study: Study, modes: Modes, c
         snapshot_index=np.searchsorted(steps, np.concatenate([s.snapshot_steps for s in segments])),
     )
     energies = np.concatenate([s.energies[..., case] for s in segments])
-    return RingDown(trajectory, _ledger(energies), np.concatenate([s.iterations[:, case] for s in segments]))
+    iterations = np.concatenate([s.iterations[:, case] for s in segments])
+    effort = StepEffort(*np.concatenate([s.effort for s in segments]).T)
+    return RingDown(trajectory, _ledger(energies), iterations, effort)
 
 
 def _inside(

@@ -140,6 +140,18 @@ class EnergyLedger:
 
 
 @dataclass(frozen=True)
+class StepEffort:
+    """Steps of the scheme since the sample before, rejected ones, and factors of the current tangent, (n_time,) each.
+
+    One step per sample, unless it did not converge or its local error was too large and it was halved.
+    """
+
+    steps: npt.NDArray[np.int64] = field(metadata={"unit": "1", "axes": "time"})
+    rejected: npt.NDArray[np.int64] = field(metadata={"unit": "1", "axes": "time"})
+    factors: npt.NDArray[np.int64] = field(metadata={"unit": "1", "axes": "time"})
+
+
+@dataclass(frozen=True)
 class RingDown:
     """One computed free decay with its energies and solver statistics.
 
@@ -147,9 +159,11 @@ class RingDown:
     ----------
     trajectory : the motion, relative to the preloaded state.
     energy : its ledger.
-    iterations : (n_time,) corrector iterations of each step, 0 for the initial state.
+    iterations : (n_time,) corrector iterations since the sample before, 0 for the initial state.
+    effort : what the samples took, common to all decays that marched together.
     """
 
     trajectory: Trajectory
     energy: EnergyLedger
     iterations: npt.NDArray[np.int64] = field(metadata={"unit": "1", "axes": "time"})
+    effort: StepEffort

@@ -98,13 +98,14 @@ def _ringdowns(context: Context) -> dict[str, Any]:
     return {item.trajectory.name: _ringdown(item) for item in ringdowns.training + ringdowns.validation}
 
 
-def _ringdown(item: RingDown) -> dict[str, float]:
+def _ringdown(item: RingDown) -> dict[str, float | int]:
     energy = item.energy
     dissipated = float(energy.damping[-1] + energy.friction[-1])
     return {
         "peak_m": float(np.max(np.abs(item.trajectory.displacement))),
         "energy_imbalance_percent": 100.0 * float(np.max(np.abs(energy.imbalance))) / dissipated,
         "mean_iterations": float(np.mean(item.iterations[1:])),
+        "rejected_steps": int(np.sum(item.effort.rejected)),
     }
 
 

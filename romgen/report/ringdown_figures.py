@@ -149,6 +149,7 @@ def energy_table(ring_downs: tuple[RingDown, ...]) -> TableBlock:
         "still stored [%]",
         "imbalance [%]",
         "iterations per step",
+        "rejected steps",
     )
     return TableBlock("Energy balance at the end of every transient, in parts of the initial energy.", header, rows)
 
@@ -164,4 +165,5 @@ def _energy_row(ring_down: RingDown) -> tuple[str, ...]:
         *(f"{share:.2f}" for share in shares),
         f"{100.0 * np.abs(ledger.imbalance).max() / stored[0]:.2g}",
         f"{ring_down.iterations[1:].mean():.2f}",
+        str(ring_down.effort.rejected.sum()),
     )

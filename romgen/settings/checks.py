@@ -145,6 +145,10 @@ def _ringdown_problems(ringdowns: RingDownSettings | None, masters: int) -> Iter
     names = [start.name for start in ringdowns.starts]
     if len(set(names)) < len(names):
         yield f"[ringdowns] names of starts must differ; got {', '.join(names)}"
+    if ringdowns.max_doublings and ringdowns.error_tolerance is None:
+        yield "[ringdowns] max_doublings needs an error_tolerance: fixed steps are never doubled"
+    if ringdowns.explicit_step is not None and ringdowns.scheme != "central_difference":
+        yield '[ringdowns] explicit_step belongs to scheme = "central_difference"'
     for start in ringdowns.starts:
         if len(start.amplitudes) != masters:
             yield f"[ringdowns] start '{start.name}' needs one amplitude per master mode ({masters}); " + (

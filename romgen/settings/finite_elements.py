@@ -160,12 +160,20 @@ class RingDownStart(Settings):
 
 
 class RingDownSettings(Settings):
-    """Table [ringdowns]: free decays by generalised-alpha, all marching together."""
+    """Table [ringdowns]: free decays, all marching together."""
 
     time_step: PositiveTime
     duration: PositiveTime
     spectral_radius: float = Field(default=0.9, ge=0.0, le=1.0)
     tolerance: float = Field(default=1e-4, gt=0.0, lt=1.0)
+    scheme: Literal["generalised_alpha", "central_difference"] = "generalised_alpha"
+    method: Literal["anderson", "newton"] = "anderson"
+    max_iterations: int = Field(default=60, ge=1)
+    refactor_above: int = Field(default=15, ge=0)
+    max_cutbacks: int = Field(default=6, ge=0, le=20)
+    max_doublings: int = Field(default=0, ge=0, le=10)
+    error_tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)
+    explicit_step: PositiveTime | None = None
     snapshot_stride: int = Field(default=10, ge=1)
     segment_steps: int = Field(default=250, ge=1)
     start: Literal["modal", "static"] = "static"

@@ -19,7 +19,7 @@ from romgen.result_store import ResultStore
 from romgen.runner import execute
 from romgen.settings import Study
 from romgen.stage import Context, Stage
-from romgen.structure import EnergyLedger, Modes, Preload, RingDown
+from romgen.structure import EnergyLedger, Modes, Preload, RingDown, StepEffort
 from romgen.trajectory import Trajectory
 from romgen.trajectory_files import write_trajectories
 from tests.romgen.settings.conftest import STUDY
@@ -63,8 +63,9 @@ class FakeElements:
         assert np.array_equal(segments[-1].state, np.full(3, 4.0))
         t = np.linspace(0.0, 1.0, 3)
         ledger = EnergyLedger(*(np.zeros(3) for _ in range(7)))
+        ones = np.ones(3, np.int64)
         return tuple(
-            RingDown(Trajectory(start.name, t, ("tip",), t[:, None]), ledger, np.ones(3, np.int64))
+            RingDown(Trajectory(start.name, t, ("tip",), t[:, None]), ledger, ones, StepEffort(ones, ones, ones))
             for start in study.ringdowns.starts
         )
 

@@ -14,7 +14,7 @@ from romgen.errors import StoreError
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 from romgen.store import CHECKSUM_BYTES, read_file, replace_atomically, write_file, write_record
-from romgen.structure import EnergyLedger, RingDown
+from romgen.structure import EnergyLedger, RingDown, StepEffort
 from romgen.trajectory import Trajectory
 from tests.records import example_model, same
 
@@ -103,7 +103,8 @@ def test_records_of_the_package(tmp_path: Path) -> None:
     trajectory = Trajectory(
         "a", t, ("mid",), t[:, None], snapshots=np.ones((2, 6), np.float32), snapshot_index=np.array([0, 4])
     )
-    ring_down = RingDown(trajectory, EnergyLedger(*(k * t for k in range(7))), np.arange(5))
+    effort = StepEffort(*(k * np.arange(5) for k in range(3)))
+    ring_down = RingDown(trajectory, EnergyLedger(*(k * t for k in range(7))), np.arange(5), effort)
     write_file(tmp_path / "ring.h5", ring_down)
     assert same(ring_down, read_file(tmp_path / "ring.h5", RingDown))
 

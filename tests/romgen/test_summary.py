@@ -15,7 +15,7 @@ from romgen.result_store import ResultStore, StageInfo
 from romgen.runner import RunResult
 from romgen.settings import Study
 from romgen.stage import Context
-from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown
+from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, StepEffort
 from romgen.summary import summarise, write_summary
 from romgen.trajectory import Trajectory
 from tests.romgen.settings.conftest import STUDY
@@ -48,7 +48,8 @@ def ring_down(name: str) -> RingDown:
     energy = EnergyLedger(
         zero, zero, zero, np.array([0.0, 0.5, 1.0]), np.array([0.0, 2.0, 3.0]), zero, np.array([0.0, 0.01, -0.02])
     )
-    return RingDown(trajectory, energy, np.array([0, 3, 5]))
+    effort = StepEffort(np.array([0, 1, 3]), np.array([0, 0, 2]), np.array([0, 0, 1]))
+    return RingDown(trajectory, energy, np.array([0, 3, 5]), effort)
 
 
 @pytest.fixture
@@ -95,7 +96,12 @@ def test_modes(summary: dict[str, Any]) -> None:
 
 def test_ringdowns(summary: dict[str, Any]) -> None:
     assert set(summary["ringdowns"]) == {"a", "b"}
-    assert summary["ringdowns"]["a"] == {"peak_m": 3e-3, "energy_imbalance_percent": 0.5, "mean_iterations": 4.0}
+    assert summary["ringdowns"]["a"] == {
+        "peak_m": 3e-3,
+        "energy_imbalance_percent": 0.5,
+        "mean_iterations": 4.0,
+        "rejected_steps": 2,
+    }
 
 
 def test_stages_and_absent_keys(summary: dict[str, Any]) -> None:

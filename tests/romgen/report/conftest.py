@@ -16,7 +16,7 @@ from romgen.provenance import collect_provenance
 from romgen.reduced_model import ReducedModel
 from romgen.report import OrderTrial, Reconstruction, ReportInputs, StageCost
 from romgen.settings import ForcedResponseSettings
-from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, Structure
+from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, StepEffort, Structure
 from romgen.trajectory import Trajectory
 
 # Local corners and edge midpoints of the 20-node hexahedron on the grid 0, 1, 2, VTK order.
@@ -134,7 +134,8 @@ def ring_downs(reconstructions: tuple[Reconstruction, ...]) -> tuple[RingDown, .
     ledger = EnergyLedger(
         kinetic, 0.97 * (stored - kinetic), 0.03 * (stored - kinetic), 0.3 * lost, 0.7 * lost, zero, drift
     )
-    return (RingDown(trajectory, ledger, np.r_[0, np.full(t.size - 1, 3)]),)
+    one, none = np.r_[0, np.ones(t.size - 1, np.int64)], np.zeros(t.size, np.int64)
+    return (RingDown(trajectory, ledger, 3 * one, StepEffort(one, none, none)),)
 
 
 @pytest.fixture(scope="session")
