@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,10 +33,14 @@ def _one_sided_spring() -> Model:
     operator = sp.csr_matrix(np.eye(3))
     law = np.array([[3.0, 1.0, 0.0]])
     one, zero = np.ones(1), np.zeros((1, 3))
-    contact = Contact(operator, one, 0.0 * one, law, zero, ("stop",), np.zeros(1, dtype=np.int64), one, one)
+    contact = Contact(
+        operator, one, 0.0 * one, law, zero, ("stop",), np.zeros(1, dtype=np.int64), one, one, np.eye(3)[None]
+    )
     free, none = np.array([True, False, False]), np.zeros(3)
-    offsets = np.zeros(0, dtype=np.int64)
-    return Model((), offsets, zero, (), unit, unit, contact, (), (), (), free, none, np.zeros((0, 3)), none)
+    side = graded([0.0, 1.0], [1])
+    cube = build_model([Body("cube", hex_block(side, side, side), Material(1.0, 0.0, 1.0), "linear")])
+    matrices = {"stiffness": unit, "mass": unit, "contact": contact, "points": zero}
+    return replace(cube, bodies=(), **matrices, free=free, load=none, loads=zero[:0], prescribed=none)
 
 
 @pytest.mark.parametrize("amplitude", [1e-3, 1.0])
