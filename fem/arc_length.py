@@ -85,7 +85,8 @@ def follow_path(
     ----------
     load : p, (n_dof,) N.
     start : equilibrium at load factor 0; none: the undeformed state.
-    stop : from u (n_dof,) and lambda; the path ends at the first point where it is True. None: at lambda >= 1.
+    stop : from u (n_dof,) and lambda; the path ends at the first point where it is True. None: where lambda first
+        reaches 1, at exactly 1.
 
     Raises
     ------
@@ -107,6 +108,8 @@ def follow_path(
             limit = path.limit_between(here, there)
             limits.append(len(points))
             points.append(limit)
+        if stop is None and there.factor > 1.0:
+            there = path.at_full_load(here, there)
         points.append(there)
         here = there
         if finished(here.u, here.factor):
@@ -189,6 +192,23 @@ class _Path:
             change = -float(here.du @ to_residual / self._scale**2 / across)
             u, factor = u + to_residual + change * to_load, factor + change
         return None
+
+    def at_full_load(self, here: _Point, there: _Point) -> _Point:
+        """The point with lambda = 1 between two others, by Newton at that load."""
+        share = (1.0 - here.factor) / (there.factor - here.factor)
+        model, slip = self._model, here.contact.slip
+        u = here.u + share * (there.u - here.u)
+        for _ in range(self._settings.max_iterations):
+            contact = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
+            force = model.elastic_force(u[:, None])[0] + model.contact.force(contact.traction)
+            residual = np.where(model.free, self._load - force[:, 0], 0.0)
+            to_residual, to_load = self._solve(u, slip, [residual, self._load])
+            if float(np.linalg.norm(residual)) <= self._settings.tolerance * self._size:
+                return _Point(u, 1.0, contact, *self._unit(to_load, 1.0))
+            u = u + to_residual
+        raise FemConvergenceError(
+            "no equilibrium at the full load", where="arc length", value=f"after {here.factor:.6g}"
+        )
 
     def limit_between(self, here: _Point, there: _Point) -> _Point:
         """The point between two others where d lambda/ds = 0, by the safeguarded secant method on the arc length."""
