@@ -61,12 +61,14 @@ class RomgenSlave(Fmi2Slave):
         self.modelName = model["name"]
         self._read_model(model)
         self.z = np.zeros(len(self.eigenvalues), dtype=complex)
-        self.u = np.zeros(len(model["inputs"]))
         self.warn_on_crossing = True
         self._step_length = 0.0
         self._outputs: np.ndarray | None = None
         interface = json.loads((folder / "slave.json").read_text(encoding="utf-8"))
         self.parameters = dict(interface["parameters"])
+        self.base_share = interface["base_share"]
+        self.n_load = len(model["inputs"])
+        self.u = np.zeros(self.n_load + (0 if self.base_share is None else 2))
         for kind, name, role, index in interface["variables"]:
             self._register(kind, name, role, index)
 
@@ -115,9 +117,11 @@ class RomgenSlave(Fmi2Slave):
     def _set_input(self, index: int, value: float) -> None:
         self._require_finite(value)
         self.u[index] = value
+        self._outputs = None
 
     def _set_parameter(self, name: str, value: float) -> None:
         self._require_finite(value)
+        self._outputs = None
         if name != "input_gain" and not value > 0.0:
             raise ValueError(f"{name} must be positive")
         self.parameters[name] = value
@@ -134,7 +138,7 @@ class RomgenSlave(Fmi2Slave):
         return self._trust_ratio() <= self.parameters["trust_radius"]
 
     def _nonlinear(self, z: np.ndarray) -> np.ndarray:
-        load = self.parameters["input_gain"] * (self.input_matrix @ self.u)
+        load = self.parameters["input_gain"] * (self.input_matrix @ self.u[: self.n_load])
         if self.normal_form is None:
             return load
         return self.normal_form(np.concatenate([z, z.conj()])) + load
@@ -143,12 +147,20 @@ class RomgenSlave(Fmi2Slave):
         return self.eigenvalues * self.z + self._nonlinear(self.z)
 
     def _output(self) -> np.ndarray:
-        """Displacements, velocities, amplitudes, trust ratio."""
+        """Displacements, velocities, the same in space, amplitudes, phases, trust ratio."""
         if self._outputs is None:
             y = self.chart(np.concatenate([self.z, self.z.conj()])).real
             amplitude = np.abs(self.z)
-            self._outputs = np.concatenate([self.displacement(y), self.velocity(y), amplitude, [self._trust_ratio()]])
+            relative = [self.displacement(y), self.velocity(y)]
+            absolute = [] if self.base_share is None else [r + b for r, b in zip(relative, self._base_motion())]
+            polar = [amplitude, np.angle(self.z), [self._trust_ratio()]]
+            self._outputs = np.concatenate([*relative, *absolute, *polar])
         return self._outputs
+
+    def _base_motion(self) -> list[np.ndarray]:
+        """What the base adds to the displacements and the velocities."""
+        share = np.array(self.base_share) * self.parameters["input_gain"]
+        return [share * self.u[self.n_load], share * self.u[self.n_load + 1]]
 
     def _prepare(self, h: float) -> None:
         """Coefficients of one internal step length."""

@@ -1,5 +1,4 @@
 /* FMI 2.0 functions common to Model Exchange and Co-Simulation. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -89,7 +88,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
     (void)tolerance;
     if (!rom_permits(s, MODE_INSTANTIATED, "fmi2SetupExperiment"))
         return fmi2Error;
-    if (!isfinite(start) || (stop_defined && !(stop >= start)))
+    if (!rom_is_finite(start) || (stop_defined && !(stop >= start)))
         return rom_refuse(s, "fmi2SetupExperiment", "the start time is not finite or the stop time is before it");
     s->memory.time = start;
     s->memory.stop_time_defined = stop_defined ? 1.0 : 0.0;
@@ -103,6 +102,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     if (!rom_permits(s, MODE_INSTANTIATED, "fmi2EnterInitializationMode"))
         return fmi2Error;
     s->memory.mode = MODE_INITIALIZATION;
+    rom_update_start(s);
     return fmi2OK;
 }
 

@@ -14,9 +14,9 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     if (!rom_permits(s, MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP_COMPLETE, function))
         return fmi2Error;
     for (size_t k = 0; k < n; ++k) {
-        if (vr == NULL || order == NULL || value == NULL || !rom_in_block(vr[k], VR_INPUT, N_INPUT))
+        if (vr == NULL || order == NULL || value == NULL || !rom_in_block(vr[k], VR_INPUT, N_INPUT_ALL))
             return rom_refuse(s, function, "a value reference is no input");
-        if (order[k] != 1 || !isfinite(value[k]))
+        if (order[k] != 1 || !rom_is_finite(value[k]))
             return rom_refuse(s, function, "only finite first derivatives of inputs are taken");
     }
     for (size_t k = 0; k < n; ++k)
@@ -51,7 +51,7 @@ static const char *integrate(rom_instance *s, double step, rom_complex z[])
         input_at(&s->memory, (k + 0.5) * h, u_middle);
         input_at(&s->memory, (k + 1.0) * h, u_end);
         rom_etdrk4_step(&s->integrator, u_start, u_middle, u_end, &s->workspace, z);
-        if (!isfinite(rom_trust_ratio(z)))
+        if (!rom_is_finite(rom_trust_ratio(z)))
             return "the state became infinite or undefined; the state of the last communication point is kept";
         if (rom_beyond_hard_limit(s, z))
             return "trust_ratio exceeds hard_limit; the state of the last communication point is kept";
@@ -66,7 +66,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi
     (void)no_set_state_prior; /* nothing is kept for a possible rollback: states are copied on request */
     if (!rom_permits(s, MODE_STEP_COMPLETE, "fmi2DoStep"))
         return fmi2Error;
-    if (!isfinite(current_time) || !isfinite(step) || !(step > 0.0))
+    if (!rom_is_finite(current_time) || !rom_is_finite(step) || !(step > 0.0))
         return rom_refuse(s, "fmi2DoStep", "the communication step must be positive and finite");
     if (s->memory.stop_time_defined != 0.0 && current_time + step > s->memory.stop_time + 1e-6 * step)
         return rom_refuse(s, "fmi2DoStep", "the step passes the stop time given to fmi2SetupExperiment");

@@ -1,5 +1,4 @@
 /* FMI 2.0 functions for Model Exchange: the model has no events, only continuous states. */
-#include <math.h>
 #include <string.h>
 
 #include "rom_instance.h"
@@ -72,7 +71,7 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
     rom_instance *s = c;
     if (!permits_model_exchange(s, MODE_EVENT | MODE_CONTINUOUS, "fmi2SetTime"))
         return fmi2Error;
-    if (!isfinite(time))
+    if (!rom_is_finite(time))
         return rom_refuse(s, "fmi2SetTime", "the time is not finite");
     s->memory.time = time;
     return fmi2OK;
@@ -85,7 +84,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
         !is_state_vector(s, x, n, "fmi2SetContinuousStates"))
         return fmi2Error;
     for (size_t k = 0; k < n; ++k)
-        if (!isfinite(x[k]))
+        if (!rom_is_finite(x[k]))
             return rom_refuse(s, "fmi2SetContinuousStates", "a state is not finite; nothing was set");
     memcpy(s->memory.z, x, sizeof s->memory.z);
     rom_invalidate(s);

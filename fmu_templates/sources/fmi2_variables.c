@@ -1,5 +1,4 @@
 /* Reading and writing variables, and their directional derivatives. */
-#include <math.h>
 #include <string.h>
 
 #include "rom_instance.h"
@@ -76,6 +75,8 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                               "a value is not finite or out of range, or its variable may not be set now; nothing was set");
     for (size_t k = 0; k < n; ++k)
         rom_set_real(s, vr[k], value[k]);
+    if (((int)s->memory.mode & MODE_INITIALIZATION) != 0)
+        rom_update_start(s);
     return fmi2OK;
 }
 
@@ -121,7 +122,7 @@ static int add_known(const rom_memory *memory, fmi2ValueReference vr, double dv,
             d->dz[vr / 2].re += dv;
         else
             d->dz[vr / 2].im += dv;
-    } else if (rom_in_block(vr, VR_INPUT, N_INPUT))
+    } else if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         d->du[vr - VR_INPUT] += memory->input_gain * dv;
     else if (vr == VR_INPUT_GAIN)
         for (size_t i = 0; i < N_INPUT_STORED; ++i)
@@ -141,13 +142,6 @@ static int is_output(fmi2ValueReference vr)
     return vr >= VR_SENSOR && vr <= VR_TRUST_RATIO;
 }
 
-static double output_tangent(const rom_output *dout, fmi2ValueReference vr)
-{
-    if (vr < VR_AMPLITUDE)
-        return dout->sensor[vr - VR_SENSOR];
-    return vr < VR_TRUST_RATIO ? dout->amplitude[vr - VR_AMPLITUDE] : dout->trust_ratio;
-}
-
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
                                         const fmi2ValueReference known[], size_t n_known, const fmi2Real dv_known[],
                                         fmi2Real dv_unknown[])
@@ -162,8 +156,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
         !references_exist(s, known, n_known, VR_REAL_END, function))
         return fmi2Error;
     for (size_t k = 0; k < n_known; ++k)
-        if (dv_known == NULL || !isfinite(dv_known[k]) || !add_known(&s->memory, known[k], dv_known[k], &d))
-            return rom_refuse(s, function, "a known is neither state, input nor parameter, or its seed is not finite");
+        if (dv_known == NULL || !rom_is_finite(dv_known[k]) || !add_known(&s->memory, known[k], dv_known[k], &d))
+            return rom_refuse(s, function, "a known is neither state, input nor tunable parameter, or its seed is not finite");
     for (size_t k = 0; k < n_unknown; ++k)
         if (dv_unknown == NULL || !(is_rate(unknown[k]) || is_output(unknown[k])))
             return rom_refuse(s, function, "an unknown is neither state derivative nor Real output");
@@ -171,7 +165,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     rom_outputs_tangent(s->memory.z, d.dz, &s->workspace, &dout);
     for (size_t k = 0; k < n_unknown; ++k) {
         const size_t i = unknown[k] - VR_RATE;
-        dv_unknown[k] = is_output(unknown[k]) ? output_tangent(&dout, unknown[k])
+        dv_unknown[k] = is_output(unknown[k]) ? rom_output_tangent(&dout, d.du, unknown[k])
                                               : (i % 2 == 0 ? drate[i / 2].re : drate[i / 2].im);
     }
     return fmi2OK;
@@ -183,6 +177,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     static const char function[] = "fmi2GetRealOutputDerivatives";
     rom_instance *s = c;
     rom_output dout;
+    double slope[N_INPUT_STORED];
     if (!rom_permits(s, MODE_STEP_COMPLETE | MODE_TERMINATED | MODE_ERROR, function) ||
         !references_exist(s, vr, n, VR_REAL_END, function))
         return fmi2Error;
@@ -191,7 +186,9 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
             return rom_refuse(s, function, "only first derivatives of Real outputs exist");
     rom_update_rate(s);
     rom_outputs_tangent(s->memory.z, s->rate, &s->workspace, &dout);
+    for (size_t i = 0; i < N_INPUT_STORED; ++i)
+        slope[i] = s->memory.input_gain * s->memory.input_derivative[i];
     for (size_t k = 0; k < n; ++k)
-        value[k] = output_tangent(&dout, vr[k]);
+        value[k] = rom_output_tangent(&dout, slope, vr[k]);
     return fmi2OK;
 }

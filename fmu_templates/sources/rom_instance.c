@@ -106,6 +106,34 @@ static double part(const rom_complex z[], size_t i)
     return i % 2 == 0 ? z[i / 2].re : z[i / 2].im;
 }
 
+/* What the motion of the base adds to sensor row k, displacements first */
+static double base_motion(const rom_memory *memory, size_t k)
+{
+    const size_t input = k < N_SENSOR ? N_INPUT : N_INPUT + 1;
+    return rom_base_share(k % N_SENSOR) * memory->input_gain * memory->input[ABSOLUTE_OUTPUTS ? input : 0];
+}
+
+double rom_output_tangent(const rom_output *dout, const double du[], fmi2ValueReference vr)
+{
+    if (vr < VR_ABSOLUTE)
+        return dout->sensor[vr - VR_SENSOR];
+    if (vr < VR_AMPLITUDE) {
+        const size_t k = vr - VR_ABSOLUTE, input = k < N_SENSOR ? N_INPUT : N_INPUT + 1;
+        return dout->sensor[k] + rom_base_share(k % N_SENSOR) * du[ABSOLUTE_OUTPUTS ? input : 0];
+    }
+    if (vr < VR_PHASE)
+        return dout->amplitude[vr - VR_AMPLITUDE];
+    return vr < VR_TRUST_RATIO ? dout->phase[vr - VR_PHASE] : dout->trust_ratio;
+}
+
+void rom_update_start(rom_instance *s)
+{
+    if (!START_FROM_SENSORS)
+        return;
+    s->memory.start_misfit = rom_find_start(s->memory.start, &s->workspace, s->memory.z);
+    rom_invalidate(s);
+}
+
 /* `vr` has been checked to be below VR_REAL_END */
 double rom_get_real(rom_instance *s, fmi2ValueReference vr)
 {
@@ -115,12 +143,20 @@ double rom_get_real(rom_instance *s, fmi2ValueReference vr)
         rom_update_rate(s);
         return part(s->rate, vr - VR_RATE);
     }
-    if (rom_in_block(vr, VR_INPUT, N_INPUT))
+    if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return s->memory.input[vr - VR_INPUT];
-    if (vr < VR_AMPLITUDE)
+    if (vr < VR_ABSOLUTE)
         return updated_output(s)->sensor[vr - VR_SENSOR];
-    if (vr < VR_TRUST_RATIO)
+    if (vr < VR_AMPLITUDE)
+        return updated_output(s)->sensor[vr - VR_ABSOLUTE] + base_motion(&s->memory, vr - VR_ABSOLUTE);
+    if (vr < VR_PHASE)
         return updated_output(s)->amplitude[vr - VR_AMPLITUDE];
+    if (vr < VR_TRUST_RATIO)
+        return updated_output(s)->phase[vr - VR_PHASE];
+    if (rom_in_block(vr, VR_START, N_START))
+        return s->memory.start[vr - VR_START];
+    if (rom_in_block(vr, VR_START_MISFIT, START_FROM_SENSORS))
+        return s->memory.start_misfit;
     switch (vr) {
     case VR_TRUST_RATIO:
         return updated_output(s)->trust_ratio;
@@ -142,12 +178,14 @@ int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value
 {
     const int mode = (int)s->memory.mode;
     const int before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
-    if (!isfinite(value))
+    if (!rom_is_finite(value))
         return 0;
     if (vr < VR_RATE)
-        return before_start;
-    if (rom_in_block(vr, VR_INPUT, N_INPUT))
+        return before_start && !START_FROM_SENSORS;
+    if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return 1;
+    if (rom_in_block(vr, VR_START, N_START))
+        return before_start;
     switch (vr) {
     case VR_INPUT_GAIN:
         return (mode & MODE_CONTINUOUS) == 0;
@@ -165,12 +203,14 @@ void rom_set_real(rom_instance *s, fmi2ValueReference vr, double value)
 {
     s->rate_is_valid = 0;
     if (vr < VR_RATE)
-        s->output_is_valid = 0; /* no output depends on an input */
+        s->output_is_valid = 0; /* what is kept of the outputs depends on no input */
     if (vr < VR_RATE && vr % 2 == 0)
         s->memory.z[vr / 2].re = value;
     else if (vr < VR_RATE)
         s->memory.z[vr / 2].im = value;
-    else if (rom_in_block(vr, VR_INPUT, N_INPUT)) {
+    else if (rom_in_block(vr, VR_START, N_START))
+        s->memory.start[vr - VR_START] = value;
+    else if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL)) {
         s->memory.input[vr - VR_INPUT] = value;
         s->memory.input_derivative[vr - VR_INPUT] = 0.0;
     } else if (vr == VR_INPUT_GAIN)

@@ -7,8 +7,10 @@
 #include "fmi2Functions.h"
 #include "rom_etdrk4.h"
 #include "rom_log.h"
+#include "rom_start.h"
 
-#define N_INPUT_STORED ROM_AT_LEAST_ONE(N_INPUT)
+#define N_INPUT_ALL (N_INPUT + N_BASE_MOTION) /* loads, then the motion of the base */
+#define N_INPUT_STORED ROM_AT_LEAST_ONE(N_INPUT_ALL)
 
 /* Modes of the FMI 2.0 state machine, as bits so that each call can name the modes it is allowed in. */
 enum {
@@ -29,14 +31,18 @@ enum {
     VR_STATE = 0,
     VR_RATE = VR_STATE + N_REDUCED,
     VR_INPUT = VR_RATE + N_REDUCED,
-    VR_SENSOR = VR_INPUT + N_INPUT,
-    VR_AMPLITUDE = VR_SENSOR + N_SENSOR_ROW,
-    VR_TRUST_RATIO = VR_AMPLITUDE + N_MODE,
+    VR_SENSOR = VR_INPUT + N_INPUT_ALL,
+    VR_ABSOLUTE = VR_SENSOR + N_SENSOR_ROW,
+    VR_AMPLITUDE = VR_ABSOLUTE + N_ABSOLUTE,
+    VR_PHASE = VR_AMPLITUDE + N_MODE,
+    VR_TRUST_RATIO = VR_PHASE + N_MODE,
     VR_INPUT_GAIN,
     VR_TRUST_RADIUS,
     VR_HARD_LIMIT,
     VR_MAX_INTERNAL_STEP,
-    VR_FREQUENCY,
+    VR_START,
+    VR_START_MISFIT = VR_START + N_START,
+    VR_FREQUENCY = VR_START_MISFIT + START_FROM_SENSORS,
     VR_DAMPING = VR_FREQUENCY + N_MODE,
     VR_REAL_END = VR_DAMPING + N_MODE
 };
@@ -51,6 +57,7 @@ typedef struct {
     rom_complex z[N_MODE];
     double input[N_INPUT_STORED], input_derivative[N_INPUT_STORED]; /* at the present time, before the gain */
     double input_gain, trust_radius, hard_limit, max_internal_step, warn_on_crossing;
+    double start[ROM_AT_LEAST_ONE(N_START)], start_misfit; /* displacements and velocities to start from */
     double inside;
 } rom_memory;
 
@@ -93,6 +100,12 @@ void rom_update_rate(rom_instance *s);
 fmi2Status rom_check_trust(rom_instance *s);
 
 int rom_beyond_hard_limit(const rom_instance *s, const rom_complex z[]);
+
+/* With START_FROM_SENSORS, puts the state where the sensors best show the start values; does nothing otherwise. */
+void rom_update_start(rom_instance *s);
+
+/* d outputs along dz and, for the absolute ones, along du (all inputs, after the gain), in the order of the outputs. */
+double rom_output_tangent(const rom_output *dout, const double du[], fmi2ValueReference vr);
 
 double rom_get_real(rom_instance *s, fmi2ValueReference vr);
 int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value);

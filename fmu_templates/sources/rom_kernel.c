@@ -135,18 +135,21 @@ void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out)
     chart_rows(w->chart, w->sensor);
     real_monomials(sensor_product, N_SENSOR_PRODUCT, w->sensor);
     sensor_rows(w->sensor, out->sensor);
-    for (size_t j = 0; j < N_MODE; ++j)
+    for (size_t j = 0; j < N_MODE; ++j) {
         out->amplitude[j] = modulus(z[j]);
+        out->phase[j] = atan2(z[j].im, z[j].re);
+    }
     out->trust_ratio = rom_trust_ratio(z);
 }
 
-/* d|z_j| = Re(conj z_j dz_j) / |z_j|; the trust ratio follows the mode that leads it */
+/* d|z_j| = Re(conj z_j dz_j) / |z_j|, d arg z_j = Im(conj z_j dz_j) / |z_j|^2, both taken as 0 at rest; the trust ratio follows the mode that leads it */
 static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
 {
     double leading = -1.0;
     for (size_t j = 0; j < N_MODE; ++j) {
         const double r = modulus(z[j]);
         dout->amplitude[j] = r > 0.0 ? (z[j].re * dz[j].re + z[j].im * dz[j].im) / r : 0.0;
+        dout->phase[j] = r > 0.0 ? (z[j].re * dz[j].im - z[j].im * dz[j].re) / r / r : 0.0;
         if (r / trained_amplitude[j] > leading) {
             leading = r / trained_amplitude[j];
             dout->trust_ratio = dout->amplitude[j] / trained_amplitude[j];
@@ -186,4 +189,14 @@ rom_complex rom_eigenvalue(size_t mode)
 double rom_trained_amplitude(size_t mode)
 {
     return trained_amplitude[mode];
+}
+
+double rom_base_share(size_t sensor)
+{
+    return base_share[sensor];
+}
+
+double rom_sensor_size(size_t row)
+{
+    return sensor_size[row / N_SENSOR];
 }

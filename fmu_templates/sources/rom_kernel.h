@@ -11,9 +11,19 @@
 #define N_SENSOR_ROW (2 * N_SENSOR)
 #define ROM_AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 
+#define N_BASE_MOTION (ABSOLUTE_OUTPUTS ? 2 : 0) /* displacement and velocity of the base, inputs */
+#define N_ABSOLUTE (ABSOLUTE_OUTPUTS ? N_SENSOR_ROW : 0)
+#define N_START (START_FROM_SENSORS ? N_SENSOR_ROW : 0)
+
 typedef struct {
     double re, im;
 } rom_complex;
+
+/* By arithmetic: the macros of math.h call into one particular C library on some platforms. */
+static inline int rom_is_finite(double x)
+{
+    return x - x == 0.0;
+}
 
 /* One monomial as the product of two earlier ones; the first 2 m "monomials" are the variables themselves. */
 typedef struct {
@@ -30,6 +40,7 @@ typedef struct {
 typedef struct {
     double sensor[ROM_AT_LEAST_ONE(N_SENSOR_ROW)]; /* displacements in m, then velocities in m/s */
     double amplitude[N_MODE];                      /* |z_j| */
+    double phase[N_MODE];                          /* arg z_j in rad, 0 at rest */
     double trust_ratio;                            /* max_j |z_j| / trained_j */
 } rom_output;
 
@@ -51,5 +62,11 @@ void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_work
 double rom_trust_ratio(const rom_complex z[]);
 rom_complex rom_eigenvalue(size_t mode);
 double rom_trained_amplitude(size_t mode);
+
+/* Share of the motion of the base that sensor k sees. */
+double rom_base_share(size_t sensor);
+
+/* Typical size of a sensor output, by which a misfit is measured. */
+double rom_sensor_size(size_t row);
 
 #endif

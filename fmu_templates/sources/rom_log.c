@@ -1,5 +1,7 @@
 #include "rom_log.h"
 
+#include "rom_kernel.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -64,14 +66,14 @@ static void put_digits(message *m, unsigned long value, int width)
 /* d.dddddde[-]dd, independent of the locale */
 static void put_number(message *m, double value)
 {
-    if (isnan(value)) {
+    if (value != value) {
         put_text(m, "nan");
         return;
     }
     if (value < 0.0)
         put(m, '-');
     value = fabs(value);
-    if (isinf(value)) {
+    if (!rom_is_finite(value)) {
         put_text(m, "inf");
         return;
     }

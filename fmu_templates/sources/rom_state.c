@@ -12,7 +12,7 @@
 #define SERIALISED_SIZE (WORD * (N_HEADER + N_MEMORY))
 
 static const uint64_t magic = UINT64_C(0x314e45474d4f52); /* the bytes "ROMGEN1" */
-static const uint64_t layout_version = 1;
+static const uint64_t layout_version = 2;
 
 static void write_word(unsigned char *bytes, uint64_t word)
 {

@@ -11,7 +11,9 @@ import numpy.typing as npt
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
+from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
 from romgen.fmu.programme import MonomialProgramme, fold_conjugates, monomial_programme
+from romgen.fmu.records import InterfaceOptions
 from romgen.polynomial import Scalar
 from romgen.reduced_model import ReducedModel
 
@@ -22,7 +24,7 @@ MAX_PRODUCTS = 60000
 """Monomials are numbered by 16-bit integers in the runtime."""
 
 
-def coefficients_header(model: ReducedModel) -> str:
+def coefficients_header(model: ReducedModel, options: InterfaceOptions = InterfaceOptions()) -> str:
     """The text of coefficients.h: constant data only, decimal numbers that read back exactly."""
     chart = fold_conjugates(model.chart)
     form_programme = monomial_programme(model.normal_form.exponents)
@@ -52,6 +54,8 @@ def coefficients_header(model: ReducedModel) -> str:
             _array("double chart_re[N_REDUCED + N_CHART_PRODUCT][N_REDUCED]", map(_row, chart_dense.real.T)),
             _array("double chart_im[N_REDUCED + N_CHART_PRODUCT][N_REDUCED]", map(_row, chart_dense.imag.T)),
             _products("sensor", sensor_programme),
+            _array("double base_share[N_SENSOR]", map(_real, options.base_share or (0.0,) * len(model.sensors))),
+            _array("double sensor_size[2]", map(_real, _sensor_sizes(model))),
             _array("double sensor_coefficient[N_REDUCED + N_SENSOR_PRODUCT][N_SENSOR_ROW]", map(_row, sensors.T)),
             "#endif",
             "",
@@ -59,7 +63,7 @@ def coefficients_header(model: ReducedModel) -> str:
     )
 
 
-def sizes_header(model: ReducedModel, guid: str, coefficients: str) -> str:
+def sizes_header(model: ReducedModel, guid: str, coefficients: str, options: InterfaceOptions = InterfaceOptions()) -> str:
     """The text of model_sizes.h: identity and sizes of the model."""
     form = monomial_programme(model.normal_form.exponents)
     chart = monomial_programme(fold_conjugates(model.chart).exponents)
@@ -67,6 +71,8 @@ def sizes_header(model: ReducedModel, guid: str, coefficients: str) -> str:
         "N_MODE": len(model.eigenvalues),
         "N_INPUT": len(model.inputs),
         "N_SENSOR": len(model.sensors),
+        "ABSOLUTE_OUTPUTS": int(options.base_share is not None),
+        "START_FROM_SENSORS": int(options.start_from_sensors),
         "N_FORM_PRODUCT": len(form.products),
         "N_FORM_TERM": int(np.count_nonzero(model.normal_form.coefficients)),
         "N_CHART_PRODUCT": len(chart.products),
@@ -80,6 +86,11 @@ def sizes_header(model: ReducedModel, guid: str, coefficients: str) -> str:
     lines = [f"#define {name} {value}" for name, value in sizes.items()]
     head = f"/* Identity and sizes of the reduced model {model.name}; generated. */"
     return "\n".join([head, "#ifndef MODEL_SIZES_H", "#define MODEL_SIZES_H", "", *lines, "", "#endif", ""])
+
+
+def _sensor_sizes(model: ReducedModel) -> tuple[float, float]:
+    """Largest displacement (m) and velocity (m/s) of any sensor in the trained range, 1 where nothing moves."""
+    return float(np.max(nominal_displacement(model))) or 1.0, float(np.max(nominal_velocity(model))) or 1.0
 
 
 def _sensor_programme(model: ReducedModel) -> MonomialProgramme:

@@ -26,6 +26,19 @@ FLAGS = ("-std=c99", "-O2", "-s", "-fPIC", "-shared", "-fvisibility=hidden", "-f
 """No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
 
 
+WINDOWS_IMPORTS = ("atan2", "calloc", "ceil", "cos", "exp", "free", "memcpy", "memmove", "memset", "sin", "sqrt",
+                   "strcmp", "strlen")  # fmt: skip
+"""Functions of the Windows C library that the runtime calls."""
+
+WINDOWS_ENTRY = """int _fltused = 1; /* asked for by compilers where floating-point numbers are used */
+int __stdcall DllMainCRTStartup(void *instance, unsigned long reason, void *reserved)
+{
+    (void)instance, (void)reason, (void)reserved;
+    return 1; /* the runtime has nothing to set up */
+}
+"""
+
+
 @dataclass(frozen=True)
 class Compiler:
     """One way to turn C sources into a shared library.
@@ -92,10 +105,32 @@ def compile_library(compiler: Compiler, target: str | None, sources: Path, outpu
     RomgenError : with the compiler's own words when it fails.
     """
     files = sorted(path.name for path in sources.glob("*.c"))
+    if target and "windows" in target:
+        _compile_for_windows(compiler, target, sources, output, files)
+        return
     target_flags = ["-target", target] if target else []
-    libraries = [] if target and "windows" in target else ["-lm"]
-    command = [*compiler.command, *target_flags, *FLAGS, "-o", str(output), *files, *libraries]
-    result = subprocess.run(command, cwd=sources, env=_environment(), capture_output=True, text=True, check=False)
+    command = [*compiler.command, *target_flags, *FLAGS, "-o", str(output), *files, "-lm"]
+    _run(compiler, target, command, sources)
+
+
+def _compile_for_windows(compiler: Compiler, target: str, sources: Path, output: Path, files: list[str]) -> None:
+    """Link against msvcrt.dll alone: it is part of every Windows, and no C library has to be built first."""
+    (sources / "msvcrt.def").write_text("\n".join(["LIBRARY msvcrt.dll", "EXPORTS", *WINDOWS_IMPORTS, ""]))
+    (sources / "dll_entry.c").write_text(WINDOWS_ENTRY)
+    compile_flags = ["-target", target, *(flag for flag in FLAGS if flag not in {"-shared", "-s"})]
+    objects = [f"{Path(name).stem}.obj" for name in (*files, "dll_entry.c")]
+    for name, compiled in zip((*files, "dll_entry.c"), objects, strict=True):
+        _run(compiler, target, [*compiler.command, *compile_flags, "-c", name, "-o", compiled], sources)
+    library = ["dlltool", "-m", "i386:x86-64", "-d", "msvcrt.def", "-l", "msvcrt.lib"]
+    _run(compiler, target, [*compiler.command[:-1], *library], sources)
+    link = ["-target", target, "-shared", "-s", "-nostdlib", "-o", str(output), *objects, "msvcrt.lib"]
+    _run(compiler, target, [*compiler.command, *link], sources)
+    for name in ("dll_entry.c", "msvcrt.def", "msvcrt.lib", *objects):
+        (sources / name).unlink(missing_ok=True)
+
+
+def _run(compiler: Compiler, target: str | None, command: list[str], folder: Path) -> None:
+    result = subprocess.run(command, cwd=folder, env=_environment(), capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise RomgenError(
             f"{compiler.name} could not compile the runtime",

@@ -18,6 +18,7 @@ from fmpy.validation import validate_fmu
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError, NumericalError
 from romgen.fmu.records import FmuReplay
+from romgen.fmu.sensor_variables import BASE_MOTION
 
 Hold = Literal["constant", "linear"]
 
@@ -145,15 +146,18 @@ def _collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
 
 
 def _references(variables: list[Any]) -> References:
-    """References by role: states are what a derivative points to, sensors are outputs in m and m/s."""
+    """References by role: states are what a derivative points to, sensors are relative outputs in m and m/s."""
 
     def outputs(unit: str) -> tuple[int, ...]:
-        return tuple(v.valueReference for v in reals if v.causality == "output" and v.unit == unit)
+        return tuple(v.valueReference for v in reals if v.unit == unit and v.name in relative)
 
     reals = [v for v in variables if v.type == "Real"]
+    named = {v.name for v in reals if v.causality == "output"}
+    relative = {name for name in named if name.removesuffix("_absolute") not in named - {name}}
+    base = {name for name, _ in BASE_MOTION}
     return References(
         states=tuple(v.derivative.valueReference for v in reals if v.derivative is not None),
-        inputs=tuple(v.valueReference for v in reals if v.causality == "input"),
+        inputs=tuple(v.valueReference for v in reals if v.causality == "input" and v.name not in base),
         displacement=outputs("m"),
         velocity=outputs("m/s"),
         trust_ratio=next(v.valueReference for v in reals if v.name == "trust_ratio"),

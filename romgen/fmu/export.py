@@ -18,9 +18,10 @@ from romgen.fmu.description import (
 )
 from romgen.fmu.interface import build_interface
 from romgen.fmu.model_file import model_json
-from romgen.fmu.records import FmuExport, FmuInfo
-from romgen.fmu.selection import exported_model
+from romgen.fmu.records import FmuExport, FmuInfo, InterfaceOptions
+from romgen.fmu.selection import exported_model, interface_options
 from romgen.fmu.templates import licence_files, runtime_sources
+from romgen.fmu.variables import PLAIN
 from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
@@ -56,27 +57,30 @@ def export_fmu(
     RomgenError : when a compiler fails.
     """
     info = info or FmuInfo()
-    chosen = exported_model(model, settings.sensors)
-    content, guid = _content(chosen, settings, info)
+    chosen, options = exported_model(model, settings.sensors), interface_options(model, settings, info)
+    content, guid = _content(chosen, settings.step_size, info, options)
     sources = {Path(name).name: data for name, data in content.items() if name.startswith("sources/")}
     binaries = build_binaries(chosen.name, sources, settings.platforms, report)
     size, sha256 = write_archive(Path(path), {**content, **binaries.files})
     return FmuExport(str(path), size, sha256, guid, binaries.platforms, binaries.compiler, binaries.notes)
 
 
-def generated_sources(model: ReducedModel, guid: str) -> dict[str, bytes]:
+def generated_sources(model: ReducedModel, guid: str, options: InterfaceOptions = PLAIN) -> dict[str, bytes]:
     """All C files of a unit by name: the runtime, the FMI headers and the two generated headers."""
-    coefficients = coefficients_header(model)
-    generated = {"coefficients.h": coefficients, "model_sizes.h": sizes_header(model, guid, coefficients)}
+    coefficients = coefficients_header(model, options)
+    sizes = sizes_header(model, guid, coefficients, options)
+    generated = {"coefficients.h": coefficients, "model_sizes.h": sizes}
     return {**runtime_sources(), **{name: text.encode() for name, text in generated.items()}}
 
 
-def _content(model: ReducedModel, settings: FmuSettings, info: FmuInfo) -> tuple[dict[str, bytes], str]:
+def _content(
+    model: ReducedModel, step_size: float, info: FmuInfo, options: InterfaceOptions
+) -> tuple[dict[str, bytes], str]:
     """Everything in the archive but the binaries, and the identifier made from it."""
-    interface = build_interface(model, info.input_range)
+    interface = build_interface(model, options)
     source_files = tuple(sorted(name for name in runtime_sources() if name.endswith(".c")))
-    text = DescriptionText(model.name, tool_name(), info, settings.step_size, NATIVE_INTERFACES, source_files)
-    unnamed = generated_sources(model, "")
+    text = DescriptionText(model.name, tool_name(), info, step_size, NATIVE_INTERFACES, source_files)
+    unnamed = generated_sources(model, "", options)
     undated = model_description(text, interface, guid="", date="")
     guid = content_guid(undated, *(data for _, data in sorted(unnamed.items())))
     description = model_description(text, interface, guid=guid, date=generation_time())
@@ -85,7 +89,7 @@ def _content(model: ReducedModel, settings: FmuSettings, info: FmuInfo) -> tuple
         "documentation/index.html": documentation_page(model, interface, text).encode(),
         "resources/rom.json": model_json(model).encode(),
         **licence_files(),
-        **{f"sources/{name}": data for name, data in generated_sources(model, guid).items()},
+        **{f"sources/{name}": data for name, data in generated_sources(model, guid, options).items()},
     }
     if info.picture is not None:
         content["model.png"] = info.picture

@@ -7,6 +7,7 @@ import json
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
+from romgen.fmu.programme import fold_conjugates
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 
@@ -14,7 +15,7 @@ FORMAT = "romgen reduced model 1"
 
 
 def model_json(model: ReducedModel) -> str:
-    """All numbers of a model, one key of the top level per line, decimals that read back exactly."""
+    """All numbers of a model, conjugate pairs of the chart folded into one term, one key of the top level per line, decimals that read back exactly."""
     content = {
         "format": FORMAT,
         "name": model.name,
@@ -22,7 +23,7 @@ def model_json(model: ReducedModel) -> str:
         "zeta = (z, conj z)",
         "eigenvalues_per_s": _pairs(model.eigenvalues),
         "normal_form": _map(model.normal_form),
-        "chart": _map(model.chart),
+        "chart": _map(fold_conjugates(model.chart)),
         "inverse_chart": _map(model.inverse_chart),
         "scale": model.scale.tolist(),
         "displacement_m": _map(model.displacement),

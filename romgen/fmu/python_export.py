@@ -26,16 +26,16 @@ from romgen.fmu.description import (
 )
 from romgen.fmu.interface import FmuInterface, build_interface
 from romgen.fmu.model_file import model_json
-from romgen.fmu.records import FmuExport, FmuInfo
-from romgen.fmu.selection import exported_model
+from romgen.fmu.records import FmuExport, FmuInfo, InterfaceOptions
+from romgen.fmu.selection import exported_model, interface_options
 from romgen.fmu.templates import licence_files, template_text
-from romgen.fmu.variables import Variable
+from romgen.fmu.variable import Variable
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
 
 NOTES = (
     "needs a Python interpreter with numpy on the target; plain C importers cannot load it",
-    "inputs are held in each step; no state saving, no Model Exchange",
+    "inputs are held in each step; no state saving, no Model Exchange, start values of the states only",
     "modelDescription.xml was rewritten: pythonfmu leaves InitialUnknowns empty and draws a new GUID at each build",
 )
 
@@ -54,13 +54,14 @@ def export_pythonfmu(
     InputError : for a model or settings that cannot be exported.
     """
     chosen = exported_model(model, settings.sensors)
-    interface = _numbered_as_registered(build_interface(chosen, (info or FmuInfo()).input_range))
+    options = replace(interface_options(model, settings, info or FmuInfo()), start_from_sensors=False)
+    interface = _numbered_as_registered(build_interface(chosen, options))
     tool = f"{tool_name()}, pythonfmu {importlib.metadata.version('pythonfmu')}"
     text = DescriptionText(chosen.name, tool, info or FmuInfo(), settings.step_size, PYTHON_INTERFACES)
     resources = {
         f"{chosen.name}_slave.py": template_text("slave.py"),
         "rom.json": model_json(chosen),
-        "slave.json": _slave_json(interface),
+        "slave.json": _slave_json(interface, options),
     }
     guid = content_guid(model_description(text, interface, guid="", date=""), *resources.values())
     content = {
@@ -80,7 +81,7 @@ def _numbered_as_registered(interface: FmuInterface) -> FmuInterface:
     return replace(interface, variables=tuple(replace(v, reference=k) for k, v in enumerate(interface.variables)))
 
 
-def _slave_json(interface: FmuInterface) -> str:
+def _slave_json(interface: FmuInterface, options: InterfaceOptions) -> str:
     """For each variable its type, name, role and place in that role; and the values of parameters and constants."""
     count: dict[str, int] = {}
     rows = []
@@ -89,7 +90,7 @@ def _slave_json(interface: FmuInterface) -> str:
         rows.append(["Boolean" if v.unit is None else "Real", v.name, role, count.get(role, 0)])
         count[role] = count.get(role, 0) + 1
     values = {v.name: float(v.start) for v in interface.variables if _role(v) in {"parameter", "constant"} and v.start}
-    return json.dumps({"variables": rows, "parameters": values}, indent=0)
+    return json.dumps({"variables": rows, "parameters": values, "base_share": options.base_share}, indent=0)
 
 
 def _role(v: Variable) -> str:

@@ -19,6 +19,7 @@ class FmuInfo:
     origin : how the model was made, one entry per line of the documentation page.
     errors_percent : (trajectory, NMTE in percent) rows of the error table.
     input_range : (minimum, maximum) of each model input in training, SI units, or () where unknown.
+    base_share : cosine between each sensor of the model and the motion of the base, for absolute outputs; () for 1.
     stop_time : s, of the default experiment.
     picture : PNG bytes of the icon, or None.
     """
@@ -31,8 +32,25 @@ class FmuInfo:
     origin: tuple[str, ...] = ()
     errors_percent: tuple[tuple[str, float], ...] = ()
     input_range: tuple[tuple[float, float], ...] = ()
+    base_share: tuple[float, ...] = ()
     stop_time: float = 1.0
     picture: bytes | None = None
+
+
+@dataclass(frozen=True)
+class InterfaceOptions:
+    """What the variables of a unit show beyond the model.
+
+    Attributes
+    ----------
+    input_range : (minimum, maximum) of each model input in training, SI units, or () where unknown.
+    base_share : for absolute outputs, the share of the motion of the base that each exported sensor sees; None without.
+    start_from_sensors : start values are displacements and velocities of the sensors instead of the states.
+    """
+
+    input_range: tuple[tuple[float, float], ...] = ()
+    base_share: tuple[float, ...] | None = None
+    start_from_sensors: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,13 @@ import re
 import numpy as np
 
 from romgen.errors import InputError
+from romgen.fmu.records import FmuInfo, InterfaceOptions
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
+from romgen.settings import FmuSettings
 
 WHERE = "FMU export"
+BASE_ACCELERATION = "base_acceleration"
 
 
 def exported_model(model: ReducedModel, sensors: tuple[str, ...] | None) -> ReducedModel:
@@ -43,6 +46,31 @@ def exported_model(model: ReducedModel, sensors: tuple[str, ...] | None) -> Redu
             "a mode was never excited in training", where=WHERE, value=chosen.trained_amplitude, advice=advice
         )
     return chosen
+
+
+def interface_options(model: ReducedModel, settings: FmuSettings, info: FmuInfo) -> InterfaceOptions:
+    """What the variables show beyond the model: ranges, absolute outputs, start values.
+
+    Parameters
+    ----------
+    model : the whole model, all sensors.
+    settings, info : of the export.
+
+    Raises
+    ------
+    InputError : for absolute outputs without motion of the base, or shares that do not fit the sensors.
+    """
+    share = None
+    if settings.absolute:
+        if BASE_ACCELERATION not in model.inputs:
+            advice = "leave [fmu] absolute out, or give [base_acceleration]"
+            raise InputError("absolute outputs need motion of the base", where="[fmu] absolute", advice=advice)
+        given = info.base_share or (1.0,) * len(model.sensors)
+        if len(given) != len(model.sensors):
+            raise InputError("one share per sensor is needed", where="FmuInfo.base_share", value=given)
+        names = model.sensors if settings.sensors is None else settings.sensors
+        share = tuple(given[model.sensors.index(name)] for name in names)
+    return InterfaceOptions(info.input_range, share, settings.start == "sensors")
 
 
 def _check_identifier(name: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 STANDARD_GRAVITY = 9.80665
@@ -32,6 +33,7 @@ KNOWN = {
         Unit("1", "Dimensionless", {}),
         Unit("1/s", "Rate", {"s": -1}),
         Unit("s", "Time", {"s": 1}, (("ms", 1e3),)),
+        Unit("rad", "Angle", {"rad": 1}, (("deg", 180.0 / math.pi),)),
         Unit("Hz", "Frequency", {"s": -1}),
         Unit("m", "Displacement", {"m": 1}, (("mm", 1e3), ("um", 1e6))),
         Unit("m/s", "Velocity", {"m": 1, "s": -1}, (("mm/s", 1e3),)),

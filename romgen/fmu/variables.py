@@ -3,73 +3,48 @@
 from __future__ import annotations
 
 import math
-import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from romgen.etdrk4 import largest_step
 from romgen.fmu.coefficients import HARD_LIMIT
-from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
+from romgen.fmu.records import InterfaceOptions
+from romgen.fmu.sensor_variables import (
+    absolute_outputs,
+    base_motion,
+    input_names,
+    sensor_outputs,
+    start_values,
+)
+from romgen.fmu.variable import Variable, output, parameter, two_digits
 from romgen.reduced_model import ReducedModel
 
-
-@dataclass(frozen=True)
-class Variable:
-    """One ScalarVariable; ``None`` leaves an attribute out.
-
-    ``reference`` counts Real and Boolean variables apart; ``state`` is the 1-based index of the variable
-    this one is the time derivative of; ``unit`` is None for a Boolean.
-    """
-
-    name: str
-    reference: int
-    description: str
-    causality: str
-    variability: str
-    initial: str | None
-    unit: str | None = "1"
-    start: str | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-    nominal: float | None = None
-    state: int | None = None
+PLAIN = InterfaceOptions()
+"""Relative outputs, start values of the states, ranges not known."""
 
 
-def model_variables(model: ReducedModel, input_range: tuple[tuple[float, float], ...] = ()) -> tuple[Variable, ...]:
+def model_variables(model: ReducedModel, options: InterfaceOptions = PLAIN) -> tuple[Variable, ...]:
     """All variables of a unit in the order the C runtime counts in.
 
     Parameters
     ----------
     model : with m modes, n inputs, s sensors.
-    input_range : (minimum, maximum) of each input in training, or ().
+    options : ranges, absolute outputs, start values.
     """
     reals = (
-        *_states(model),
+        *_states(model, options),
         *_rates(model),
-        *_inputs(model, input_range),
-        *_sensors(model),
+        *_inputs(model, options.input_range),
+        *(base_motion() if options.base_share is not None else ()),
+        *sensor_outputs(model),
+        *absolute_outputs(model, options),
         *_amplitudes(model),
         *_parameters(model),
+        *start_values(model, options),
         *_constants(model),
     )
     return (*(replace(v, reference=k) for k, v in enumerate(reals)), *_booleans())
-
-
-def sensor_names(model: ReducedModel) -> tuple[tuple[str, str], ...]:
-    """Names of the displacement and velocity output of each sensor: letters, digits and underscores, unique."""
-    clean = [re.sub(r"[^0-9A-Za-z_]", "_", name) for name in model.sensors]
-    pairs = tuple((f"{name}_displacement", f"{name}_velocity") for name in clean)
-    taken = {name for pair in pairs for name in pair} | set(input_names(model))
-    legal = all(re.match(r"[A-Za-z_]", name) for name in clean)
-    if legal and len(taken) == 2 * len(pairs) + len(model.inputs):
-        return pairs
-    return tuple((f"y_{k}_{name}", f"v_{k}_{name}") for k, name in enumerate(clean, 1))
-
-
-def input_names(model: ReducedModel) -> tuple[str, ...]:
-    """Names of the inputs: letters, digits and underscores."""
-    return tuple(re.sub(r"[^0-9A-Za-z_]", "_", name) for name in model.inputs)
 
 
 def state_names(model: ReducedModel) -> tuple[str, ...]:
@@ -77,20 +52,13 @@ def state_names(model: ReducedModel) -> tuple[str, ...]:
     return tuple(f"z{j}_{part}" for j in range(1, len(model.eigenvalues) + 1) for part in ("re", "im"))
 
 
-def _states(model: ReducedModel) -> list[Variable]:
+def _states(model: ReducedModel, options: InterfaceOptions) -> list[Variable]:
     nominal = np.repeat(model.trained_amplitude, 2)
+    given = not options.start_from_sensors
+    text = "normal-form coordinate, start value " + ("free" if given else "from the sensors")
+    initial, start = ("exact", "0") if given else ("calculated", None)
     return [
-        Variable(
-            name,
-            0,
-            "normal-form coordinate, start value free",
-            "local",
-            "continuous",
-            "exact",
-            "1",
-            "0",
-            nominal=float(a),
-        )
+        Variable(name, 0, text, "local", "continuous", initial, "1", start, nominal=float(a))
         for name, a in zip(state_names(model), nominal, strict=True)
     ]
 
@@ -106,7 +74,7 @@ def _rates(model: ReducedModel) -> list[Variable]:
             "continuous",
             "calculated",
             "1/s",
-            nominal=_two_digits(float(r)),
+            nominal=two_digits(float(r)),
             state=k,
         )
         for k, (name, r) in enumerate(zip(state_names(model), omega, strict=True), 1)
@@ -134,48 +102,21 @@ def _inputs(model: ReducedModel, input_range: tuple[tuple[float, float], ...]) -
     ]
 
 
-def _sensors(model: ReducedModel) -> list[Variable]:
-    names = sensor_names(model)
-    x, v = nominal_displacement(model), nominal_velocity(model)
-    displacement = [
-        _output(pair[0], f"displacement at sensor {given} relative to the base, from the rest state", "m", float(a))
-        for pair, given, a in zip(names, model.sensors, x, strict=True)
-    ]
-    velocity = [
-        _output(pair[1], f"velocity at sensor {given} relative to the base", "m/s", float(a))
-        for pair, given, a in zip(names, model.sensors, v, strict=True)
-    ]
-    return displacement + velocity
-
-
-def _output(name: str, description: str, unit: str, nominal: float, minimum: float | None = None) -> Variable:
-    return Variable(
-        name,
-        0,
-        description,
-        "output",
-        "continuous",
-        "calculated",
-        unit,
-        minimum=minimum,
-        nominal=_two_digits(nominal),
-    )
-
-
 def _amplitudes(model: ReducedModel) -> list[Variable]:
     return [
         *(
-            _output(f"modal_amplitude_{j}", f"amplitude |z_{j}| of mode {j}", "1", float(a), 0.0)
+            output(f"modal_amplitude_{j}", f"amplitude |z_{j}| of mode {j}", "1", float(a), 0.0)
             for j, a in enumerate(model.trained_amplitude, 1)
         ),
-        _output("trust_ratio", "largest modal amplitude in units of the largest trained one", "1", 1.0, 0.0),
+        *(
+            output(f"modal_phase_{j}", f"phase arg z_{j} of mode {j}, -pi to pi, 0 at rest", "rad", 1.0)
+            for j in range(1, len(model.eigenvalues) + 1)
+        ),
+        output("trust_ratio", "largest modal amplitude in units of the largest trained one", "1", 1.0, 0.0),
     ]
 
 
 def _parameters(model: ReducedModel) -> list[Variable]:
-    def parameter(name: str, description: str, variability: str, unit: str, start: float) -> Variable:
-        return Variable(name, 0, description, "parameter", variability, "exact", unit, repr(start))
-
     return [
         parameter("input_gain", "factor on all inputs", "tunable", "1", 1.0),
         parameter(
@@ -219,8 +160,3 @@ def _booleans() -> tuple[Variable, ...]:
         Variable("inside_trust_region", 0, inside, "output", "discrete", "calculated", None),
         Variable("warn_on_crossing", 1, warn, "parameter", "tunable", "exact", None, "true"),
     )
-
-
-def _two_digits(value: float) -> float:
-    """Two significant digits, so that a nominal value does not change with round-off; 1 for 0."""
-    return float(f"{value:.1e}") or 1.0

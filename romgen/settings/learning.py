@@ -46,6 +46,8 @@ class FmuSettings(Settings):
     sensors: tuple[str, ...] | None = None
     platforms: tuple[str, ...] = ("host",)
     step_size: PositiveTime = 1e-4
+    absolute: bool = False
+    start: Literal["state", "sensors"] = "state"
     pythonfmu: bool = True
 
 

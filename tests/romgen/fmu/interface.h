@@ -12,7 +12,7 @@
 #include "model_sizes.h"
 
 #define N_STATE (2 * N_MODE)
-#define N_REAL (2 * N_STATE + N_INPUT + 2 * N_SENSOR + N_MODE + 5 + 2 * N_MODE)
+#define N_REAL (2 * N_STATE + N_INPUT + 2 * N_SENSOR + 2 * N_MODE + 5 + 2 * N_MODE)
 #define FIRST_INPUT (2 * N_STATE)
 #define FIRST_SENSOR (FIRST_INPUT + N_INPUT)
 #define H 1e-4
