@@ -152,7 +152,9 @@ class RomgenSlave(Fmi2Slave):
             y = self.chart(np.concatenate([self.z, self.z.conj()])).real
             amplitude = np.abs(self.z)
             relative = [self.displacement(y), self.velocity(y)]
-            absolute = [] if self.base_share is None else [r + b for r, b in zip(relative, self._base_motion())]
+            absolute = (
+                [] if self.base_share is None else [r + b for r, b in zip(relative, self._base_motion(), strict=True)]
+            )
             polar = [amplitude, np.angle(self.z), [self._trust_ratio()]]
             self._outputs = np.concatenate([*relative, *absolute, *polar])
         return self._outputs

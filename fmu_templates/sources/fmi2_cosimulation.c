@@ -31,6 +31,18 @@ static void input_at(const rom_memory *memory, double tau, double u[])
         u[i] = memory->input_gain * (memory->input[i] + memory->input_derivative[i] * tau);
 }
 
+/* The inputs at tau, asked for if the importer wants to give them within the step */
+static void sample(rom_instance *s, double tau, double u[])
+{
+    if (s->request_inputs == NULL)
+        input_at(&s->memory, tau, u);
+    else {
+        if (tau > 0.0)
+            s->request_inputs(s->importer, s->memory.time + tau);
+        input_at(&s->memory, 0.0, u);
+    }
+}
+
 /* n = ceil(H / h_max), forgiving round-off in H, so that the number of sub-steps never depends on accumulated time */
 static double sub_step_count(const rom_memory *memory, double step)
 {
@@ -47,9 +59,9 @@ static const char *integrate(rom_instance *s, double step, rom_complex z[])
         return "the communication step holds more than 1e7 internal steps";
     rom_etdrk4_prepare(&s->integrator, h);
     for (double k = 0.0; k < n; k += 1.0) {
-        input_at(&s->memory, k * h, u_start);
-        input_at(&s->memory, (k + 0.5) * h, u_middle);
-        input_at(&s->memory, (k + 1.0) * h, u_end);
+        sample(s, k * h, u_start);
+        sample(s, (k + 0.5) * h, u_middle);
+        sample(s, (k + 1.0) * h, u_end);
         rom_etdrk4_step(&s->integrator, u_start, u_middle, u_end, &s->workspace, z);
         if (!rom_is_finite(rom_trust_ratio(z)))
             return "the state became infinite or undefined; the state of the last communication point is kept";
@@ -63,6 +75,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi
 {
     rom_instance *s = c;
     rom_complex z[N_MODE];
+    double input[N_INPUT_STORED];
+    const double time = s != NULL ? s->memory.time : 0.0;
     (void)no_set_state_prior; /* nothing is kept for a possible rollback: states are copied on request */
     if (!rom_permits(s, MODE_STEP_COMPLETE, "fmi2DoStep"))
         return fmi2Error;
@@ -71,9 +85,14 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi
     if (s->memory.stop_time_defined != 0.0 && current_time + step > s->memory.stop_time + 1e-6 * step)
         return rom_refuse(s, "fmi2DoStep", "the step passes the stop time given to fmi2SetupExperiment");
     memcpy(z, s->memory.z, sizeof z);
+    memcpy(input, s->memory.input, sizeof input);
+    s->memory.time = current_time;
     const char *reason = integrate(s, step, z);
-    if (reason != NULL)
+    if (reason != NULL) {
+        s->memory.time = time;
+        memcpy(s->memory.input, input, sizeof input);
         return rom_fail(s, "fmi2DoStep", reason);
+    }
     memcpy(s->memory.z, z, sizeof z);
     for (size_t i = 0; i < N_INPUT_STORED; ++i)
         s->memory.input[i] += s->memory.input_derivative[i] * step;

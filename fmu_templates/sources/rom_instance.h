@@ -4,7 +4,6 @@
 
 #include <stdint.h>
 
-#include "fmi2Functions.h"
 #include "rom_etdrk4.h"
 #include "rom_log.h"
 #include "rom_start.h"
@@ -68,6 +67,9 @@ typedef struct rom_snapshot {
     struct rom_snapshot *next;
 } rom_snapshot;
 
+/* Lets the importer set the inputs at a time within a step. */
+typedef void (*rom_input_request)(void *importer, double time);
+
 typedef struct {
     rom_memory memory;
     rom_etdrk4 integrator;
@@ -78,6 +80,8 @@ typedef struct {
     rom_snapshot *snapshots; /* every live handle given out by fmi2GetFMUstate */
     rom_logger logger;
     unsigned initial_categories;
+    rom_input_request request_inputs; /* NULL: inputs are linear within a step */
+    void *importer;
 } rom_instance;
 
 rom_memory rom_initial_memory(fmi2Type kind);

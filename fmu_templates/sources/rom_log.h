@@ -2,8 +2,9 @@
 #ifndef ROM_LOG_H
 #define ROM_LOG_H
 
+#include "rom_names.h" /* before the standard's header: it may hold the prefix of its functions */
+
 #include "fmi2Functions.h"
-#include "rom_names.h"
 
 enum {
     LOG_WARNING = 1 << 0,

@@ -13,7 +13,7 @@ from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
 from romgen.fmu.programme import MonomialProgramme, fold_conjugates, monomial_programme
-from romgen.fmu.records import InterfaceOptions
+from romgen.fmu.records import PLAIN, InterfaceOptions
 from romgen.polynomial import Scalar
 from romgen.reduced_model import ReducedModel
 
@@ -24,7 +24,7 @@ MAX_PRODUCTS = 60000
 """Monomials are numbered by 16-bit integers in the runtime."""
 
 
-def coefficients_header(model: ReducedModel, options: InterfaceOptions = InterfaceOptions()) -> str:
+def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) -> str:
     """The text of coefficients.h: constant data only, decimal numbers that read back exactly."""
     chart = fold_conjugates(model.chart)
     form_programme = monomial_programme(model.normal_form.exponents)
@@ -63,7 +63,7 @@ def coefficients_header(model: ReducedModel, options: InterfaceOptions = Interfa
     )
 
 
-def sizes_header(model: ReducedModel, guid: str, coefficients: str, options: InterfaceOptions = InterfaceOptions()) -> str:
+def sizes_header(model: ReducedModel, guid: str, coefficients: str, options: InterfaceOptions = PLAIN) -> str:
     """The text of model_sizes.h: identity and sizes of the model."""
     form = monomial_programme(model.normal_form.exponents)
     chart = monomial_programme(fold_conjugates(model.chart).exponents)

@@ -22,8 +22,11 @@ TARGETS: dict[str, tuple[str, ...]] = {
 }
 """Zig targets of each FMI platform; two targets make one universal file."""
 
-FLAGS = ("-std=c99", "-O2", "-s", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+FLAGS = ("-std=c99", "-Os", "-s", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 """No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
+
+NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+"""Nothing is thrown through the runtime; Windows keeps the tables, which its debuggers walk the stack by."""
 
 
 WINDOWS_IMPORTS = ("atan2", "calloc", "ceil", "cos", "exp", "free", "memcpy", "memmove", "memset", "sin", "sqrt",
@@ -109,7 +112,7 @@ def compile_library(compiler: Compiler, target: str | None, sources: Path, outpu
         _compile_for_windows(compiler, target, sources, output, files)
         return
     target_flags = ["-target", target] if target else []
-    command = [*compiler.command, *target_flags, *FLAGS, "-o", str(output), *files, "-lm"]
+    command = [*compiler.command, *target_flags, *FLAGS, *NO_UNWIND_TABLES, "-o", str(output), *files, "-lm"]
     _run(compiler, target, command, sources)
 
 

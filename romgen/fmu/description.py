@@ -77,6 +77,7 @@ class DescriptionText:
     step_size : s, of the default experiment.
     interfaces : attributes by interface element.
     source_files : C files, or () without sources.
+    version : of FMI.
     """
 
     name: str
@@ -85,6 +86,7 @@ class DescriptionText:
     step_size: float
     interfaces: Mapping[str, Mapping[str, str]]
     source_files: tuple[str, ...] = ()
+    version: str = "2.0"
 
 
 def tool_name() -> str:
@@ -149,6 +151,7 @@ def documentation_page(model: ReducedModel, interface: FmuInterface, text: Descr
         name=model.name,
         info=text.info,
         tool=text.tool,
+        version=text.version,
         is_native="ModelExchange" in text.interfaces,
         modes=modes,
         order=int(np.max(np.sum(model.displacement.exponents, axis=1))),

@@ -18,16 +18,15 @@ from romgen.fmu.description import (
 )
 from romgen.fmu.interface import build_interface
 from romgen.fmu.model_file import model_json
-from romgen.fmu.records import FmuExport, FmuInfo, InterfaceOptions
+from romgen.fmu.records import PLAIN, FmuExport, FmuInfo, InterfaceOptions
 from romgen.fmu.selection import exported_model, interface_options
 from romgen.fmu.templates import licence_files, runtime_sources
-from romgen.fmu.variables import PLAIN
 from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
 
 
-def _silent(fraction: float, text: str) -> None:
+def silent(fraction: float, text: str) -> None:
     """Report nothing."""
 
 
@@ -37,7 +36,7 @@ def export_fmu(
     settings: FmuSettings,
     *,
     info: FmuInfo | None = None,
-    report: Report = _silent,
+    report: Report = silent,
 ) -> FmuExport:
     """Write a model as one archive for FMI 2.0 Co-Simulation and Model Exchange.
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from romgen.fmu.dependencies import sensor_states, state_couplings
-from romgen.fmu.records import InterfaceOptions
+from romgen.fmu.records import PLAIN, InterfaceOptions
 from romgen.fmu.sensor_variables import BASE_MOTION, absolute_names, input_names, sensor_names, start_names
 from romgen.fmu.variable import Variable
-from romgen.fmu.variables import PLAIN, model_variables, state_names
+from romgen.fmu.variables import model_variables, state_names
 from romgen.reduced_model import ReducedModel
 
 
@@ -89,7 +89,9 @@ def _output_unknowns(model: ReducedModel, index: dict[str, int], options: Interf
     state = [index[name] for name in state_names(model)]
     n, modes = len(model.sensors), range(len(model.eigenvalues))
     names = [pair[which] for which in (0, 1) for pair in sensor_names(model)]
-    seen = [[state[2 * j + part] for j in np.flatnonzero(row) for part in (0, 1)] for row in np.vstack(sensor_states(model))]
+    seen = [
+        [state[2 * j + part] for j in np.flatnonzero(row) for part in (0, 1)] for row in np.vstack(sensor_states(model))
+    ]
     sensors = [Unknown(index[name], tuple(row)) for name, row in zip(names, seen, strict=True)]
     if options.base_share is not None:
         for k, name in enumerate(absolute_names(model)):

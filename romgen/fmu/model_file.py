@@ -15,7 +15,7 @@ FORMAT = "romgen reduced model 1"
 
 
 def model_json(model: ReducedModel) -> str:
-    """All numbers of a model, conjugate pairs of the chart folded into one term, one key of the top level per line, decimals that read back exactly."""
+    """All numbers of a model, conjugate terms of the chart folded, one key of the top level per line, decimals that read back exactly."""
     content = {
         "format": FORMAT,
         "name": model.name,

@@ -53,6 +53,10 @@ class InterfaceOptions:
     start_from_sensors: bool = False
 
 
+PLAIN = InterfaceOptions()
+"""Relative outputs, start values of the states, ranges not known."""
+
+
 @dataclass(frozen=True)
 class FmuExport:
     """One written unit.

@@ -86,4 +86,4 @@ def start_values(model: ReducedModel, options: InterfaceOptions) -> list[Variabl
         for name, unit in zip(start_names(model), units, strict=True)
     ]
     text = "what the start state leaves of the start displacements and velocities, relative"
-    return [*given, Variable("start_misfit", 0, text, "local", "fixed", "calculated", "1")]
+    return [*given, Variable("start_misfit", 0, text, "calculatedParameter", "fixed", "calculated", "1")]

@@ -9,11 +9,19 @@ import jinja2
 
 def runtime_sources() -> dict[str, bytes]:
     """The hand-written C runtime and the FMI 2.0 headers by file name."""
-    folders = (files("fmu_templates") / "sources", files("fmu_templates") / "fmi2")
+    return _c_files("sources", "fmi2")
+
+
+def runtime_sources3() -> dict[str, bytes]:
+    """What FMI 3.0 needs besides: its functions on top of the runtime, and its headers."""
+    return _c_files("sources3", "fmi3")
+
+
+def _c_files(*folders: str) -> dict[str, bytes]:
     return {
         entry.name: entry.read_bytes()
         for folder in folders
-        for entry in sorted(folder.iterdir(), key=lambda e: e.name)
+        for entry in sorted((files("fmu_templates") / folder).iterdir(), key=lambda e: e.name)
         if entry.name.endswith((".c", ".h"))
     }
 
@@ -25,6 +33,11 @@ def licence_files() -> dict[str, bytes]:
         "documentation/licenses/license.txt": (root / "license.txt").read_bytes(),
         "documentation/licenses/fmi_headers.txt": (root / "fmi2" / "LICENSE.txt").read_bytes(),
     }
+
+
+def licence_files3() -> dict[str, bytes]:
+    """The licence of the FMI 3.0 headers by its path in the archive."""
+    return {"documentation/licenses/fmi3_headers.txt": (files("fmu_templates") / "fmi3" / "LICENSE.txt").read_bytes()}
 
 
 def template_text(name: str) -> str:

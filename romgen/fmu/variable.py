@@ -30,9 +30,7 @@ class Variable:
 def output(name: str, description: str, unit: str, nominal: float, minimum: float | None = None) -> Variable:
     """A continuous output computed from the states; its nominal value is rounded to two digits."""
     nominal = two_digits(nominal)
-    return Variable(
-        name, 0, description, "output", "continuous", "calculated", unit, minimum=minimum, nominal=nominal
-    )
+    return Variable(name, 0, description, "output", "continuous", "calculated", unit, minimum=minimum, nominal=nominal)
 
 
 def parameter(name: str, description: str, variability: str, unit: str, start: float) -> Variable:

@@ -9,7 +9,7 @@ import numpy as np
 
 from romgen.etdrk4 import largest_step
 from romgen.fmu.coefficients import HARD_LIMIT
-from romgen.fmu.records import InterfaceOptions
+from romgen.fmu.records import PLAIN, InterfaceOptions
 from romgen.fmu.sensor_variables import (
     absolute_outputs,
     base_motion,
@@ -19,9 +19,6 @@ from romgen.fmu.sensor_variables import (
 )
 from romgen.fmu.variable import Variable, output, parameter, two_digits
 from romgen.reduced_model import ReducedModel
-
-PLAIN = InterfaceOptions()
-"""Relative outputs, start values of the states, ranges not known."""
 
 
 def model_variables(model: ReducedModel, options: InterfaceOptions = PLAIN) -> tuple[Variable, ...]:
