@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
+from romgen.errors import InputError
 from romgen.fmu.programme import fold_conjugates
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
@@ -15,7 +17,7 @@ FORMAT = "romgen reduced model 1"
 
 
 def model_json(model: ReducedModel) -> str:
-    """All numbers of a model, conjugate terms of the chart folded, one key of the top level per line, decimals that read back exactly."""
+    """All numbers of a model, one key of the top level per line; conjugate terms of the chart are folded into one."""
     content = {
         "format": FORMAT,
         "name": model.name,
@@ -49,3 +51,55 @@ def _map(p: PolynomialMap[np.float64] | PolynomialMap[np.complex128]) -> dict[st
 
 def _pairs(values: ComplexArray | FloatArray) -> object:
     return np.stack([values.real, values.imag], axis=-1).tolist()
+
+
+def model_from_json(text: str) -> ReducedModel:
+    """The model that ``model_json`` wrote, exactly; the chart comes folded, which leaves its real part as it was.
+
+    Raises
+    ------
+    InputError : the text is no such model.
+    """
+    try:
+        content = json.loads(text)
+        if content["format"] != FORMAT:
+            raise ValueError(f"format is '{content['format']}'")
+        return _model(content)
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise InputError(f"is not a reduced model ({error})", where="rom.json") from error
+
+
+def _model(content: dict[str, Any]) -> ReducedModel:
+    m, n_input = len(content["eigenvalues_per_s"]), len(content["inputs"])
+    return ReducedModel(
+        name=content["name"],
+        eigenvalues=_complex(content["eigenvalues_per_s"], (m,)),
+        normal_form=_complex_map(content["normal_form"], m, 2 * m),
+        chart=_complex_map(content["chart"], 2 * m, 2 * m),
+        inverse_chart=_complex_map(content["inverse_chart"], m, 2 * m),
+        scale=np.array(content["scale"], dtype=np.float64),
+        displacement=_real_map(content["displacement_m"], 2 * m),
+        velocity=_real_map(content["velocity_m_per_s"], 2 * m),
+        sensors=tuple(content["sensors"]),
+        inputs=tuple(content["inputs"]),
+        input_units=tuple(content["input_units"]),
+        input_matrix=_complex(content["input_matrix"], (m, n_input)),
+        internal_resonance=tuple(content["internal_resonance"]),
+        trained_amplitude=np.array(content["trained_amplitude"], dtype=np.float64),
+    )
+
+
+def _complex(pairs: object, shape: tuple[int, ...]) -> ComplexArray:
+    values = np.array(pairs, dtype=np.float64).reshape((*shape, 2))
+    joined: ComplexArray = values[..., 0] + 1j * values[..., 1]
+    return joined
+
+
+def _complex_map(table: dict[str, Any], n_out: int, n_var: int) -> PolynomialMap[np.complex128]:
+    exponents = np.array(table["exponents"], dtype=np.int64).reshape(-1, n_var)
+    return PolynomialMap(exponents, _complex(table["coefficients"], (n_out, len(exponents))))
+
+
+def _real_map(table: dict[str, Any], n_var: int) -> PolynomialMap[np.float64]:
+    exponents = np.array(table["exponents"], dtype=np.int64).reshape(-1, n_var)
+    return PolynomialMap(exponents, np.array(table["coefficients"], dtype=np.float64).reshape(-1, len(exponents)))

@@ -1,0 +1,102 @@
+"""The rule checks find nothing in exported units, and every seeded fault in a damaged one."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from romgen.errors import InputError
+from romgen.fmu.export import export_fmu
+from romgen.fmu.records import FmuExport
+from romgen.fmu.rules import archive_problems, description_problems, rule_problems
+from romgen.reduced_model import ReducedModel
+from romgen.settings import FmuSettings
+
+
+@pytest.fixture(scope="module")
+def text(native: FmuExport) -> str:
+    """The model description as it is exported."""
+    with zipfile.ZipFile(native.path) as archive:
+        return archive.read("modelDescription.xml").decode()
+
+
+@pytest.mark.parametrize(
+    "kwargs", [{}, {"absolute": True}, {"start": "sensors"}, {"absolute": True, "start": "sensors"}]
+)
+def test_exported_units_keep_every_rule(kwargs: dict, model: ReducedModel, tmp_path: Path) -> None:
+    export = export_fmu(model, tmp_path / "x.fmu", FmuSettings(platforms=(), **kwargs))
+    assert rule_problems(export.path) == ()
+
+
+def test_the_pythonfmu_unit_keeps_every_rule(pythonfmu_unit: FmuExport) -> None:
+    assert rule_problems(pythonfmu_unit.path) == ()
+
+
+FAULTS = [
+    (r'fmiVersion="2.0"', 'fmiVersion="2.1"', "fmiVersion"),
+    (r'guid="[^"]*"', 'guid=""', "GUID"),
+    (r'(<CoSimulation\s+modelIdentifier=")', r"\g<1>1-", "no C name"),
+    (r'(generationDateAndTime="[^"]*)Z"', r'\1"', "generationDateAndTime"),
+    (r'name="logAll"', 'name="logStatusError"', "log category"),
+    (r'stopTime="[^"]*"', 'stopTime="-1"', "stop time"),
+    (r'stepSize="[^"]*"', 'stepSize="0"', "must be positive"),
+    (r'<Unit name="m/s">', '<Unit name="m">', "declared twice"),
+    (r'<DisplayUnit name="um"', '<DisplayUnit name="mm"', "occurs twice"),
+    (r'<SimpleType name="Velocity">', '<SimpleType name="Displacement">', "type 'Displacement' is declared twice"),
+    (r'<SimpleType name="Time">', '<SimpleType name="trust_ratio">', "name of a variable"),
+    (r'declaredType="Time"', 'declaredType="Clock"', "no type 'Clock'"),
+    (r'unit="Hz" start', 'unit="kHz" start', "is not declared"),
+    (r'displayUnit="deg"/>\s*</Sc|displayUnit="deg" nominal', 'displayUnit="grad" nominal', "display unit 'grad'"),
+    (r'name="z1_im"', 'name="z1_re"', "'z1_re' occurs twice"),
+    (r'name="z1_im"', 'name=""', "is empty"),
+    (r'(name="trust_radius"[^>]*variability=")tunable', r"\1continuous", "no legal combination"),
+    (r'(name="inside_trust_region"[^>]*variability=")discrete', r"\1continuous", "only Real"),
+    (r'(name="z1_re"[^>]*>\s*<Real [^>]*) start="0"', r"\1", "start value is missing"),
+    (r'(name="trust_ratio"[^>]*>\s*<Real [^>]*) nominal', r'\1 start="0" nominal', "given for what is calculated"),
+    (r'(name="trust_ratio"[^>]*>\s*<Real [^>]*)nominal="[^"]*"', r'\1nominal="0"', "nominal"),
+    (r'(name="base_acceleration"[^>]*>\s*<Real [^>]*)start="0"', r'\1min="1" start="0"', "outside min and max"),
+    (r'(name="base_acceleration"[^>]*>\s*<Real [^>]*)start="0"', r'\1min="1" max="-1" start="0"', "min is above max"),
+    (r'(name="z1_im" valueReference=")1"', r'\g<1>0"', "more than one can be set"),
+    (r'(name="hard_limit" valueReference=")\d+"', r'\g<1>0"', "more than one can be set"),
+    (r'derivative="2"', 'derivative="1"', "two derivatives"),
+    (r'derivative="2"', 'derivative="999"', "points to no other variable"),
+    (r'<Outputs>\s*<Unknown[^>]*/>', "<Outputs>", "ModelStructure/Outputs lists"),
+    (r'<Derivatives>\s*<Unknown[^>]*/>', "<Derivatives>", "ModelStructure/Derivatives lists"),
+    (r'<InitialUnknowns>\s*<Unknown[^>]*/>', "<InitialUnknowns>", "ModelStructure/InitialUnknowns lists"),
+    (r'(<InitialUnknowns>\s*)(<Unknown[^>]*/>)(\s*)(<Unknown[^>]*/>)', r"\1\4\3\2", "not in ascending order"),
+    (r'(<Derivatives>\s*<Unknown[^>]*dependencies=")(\d+) (\d+)', r"\1\3 \2", "dependencies are not in ascending"),
+    (r'(<Derivatives>\s*<Unknown[^>]*dependencies=")(\d+)', r"\g<1>5", "are no knowns"),
+    (r'(<Derivatives>\s*<Unknown[^>]*dependenciesKind="dependent) dependent', r"\1", "differ in length"),
+    (r'(<InitialUnknowns>\s*<Unknown[^>]*dependenciesKind=")dependent', r"\1tunable", "no kind allowed"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("pattern", "replacement", "message"), FAULTS, ids=[f[2] + "-" + f[0][:12] for f in FAULTS])
+def test_each_seeded_fault_is_found(text: str, pattern: str, replacement: str, message: str) -> None:
+    damaged, count = re.subn(pattern, replacement, text, count=1)
+    assert count == 1
+    assert any(message in problem for problem in description_problems(ElementTree.fromstring(damaged)))
+
+
+def test_faults_of_the_archive_are_found(text: str) -> None:
+    root = ElementTree.fromstring(text)
+    sources = sorted({f"sources/{file.get('name')}" for file in root.iter("File")})
+    assert archive_problems(root, sources) == ()
+    for names, message in (
+        (sources[1:], "is missing"),
+        ([*sources, "binaries\\win64\\x.dll"], "backslash"),
+        ([*sources, "binaries/win65/random_panel.dll"], "no platform"),
+        ([*sources, "binaries/win64/other.dll"], "not named after"),
+        ([], "neither a binary nor"),
+    ):
+        assert any(message in problem for problem in archive_problems(root, names))
+
+
+def test_a_file_that_is_no_unit_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "x.fmu").write_text("nothing")
+    with pytest.raises(InputError, match="not an FMU"):
+        rule_problems(tmp_path / "x.fmu")
