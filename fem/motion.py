@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -131,9 +132,12 @@ class SolvedStep:
 
 
 def extrapolated(history: FloatArray, shift: FloatArray) -> FloatArray:
-    """Next displacement from the parabola through the last ones, newest first; at the start u + h v."""
-    if len(history) == 1:
+    """Next displacement from the polynomial through the last ones, newest first; at the start u + h v.
+
+    u_(n+1) = sum_k (-1)^k C(m, k+1) u_(n-k) through m states misses h^m u^(m).
+    """
+    kept = len(history)
+    if kept == 1:
         return np.asarray(history[0] + shift)
-    if len(history) == 2:
-        return np.asarray(2.0 * history[0] - history[1])
-    return np.asarray(3.0 * history[0] - 3.0 * history[1] + history[2])
+    weights = np.array([(-1.0) ** k * comb(kept, k + 1) for k in range(kept)])
+    return np.asarray(np.tensordot(weights, history, axes=1))

@@ -22,6 +22,9 @@ from fem.motion import Effort, MotionState, SolvedStep, StepRecord
 from fem.sparse_product import SparseProduct
 
 
+KEPT = 3
+
+
 @dataclass(frozen=True)
 class StepProblem:
     """r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0 for the a at the end of the step.
@@ -133,7 +136,7 @@ class StepEquation:
             inertia_v=old.inertia_v + h * ((1.0 - s.gamma) * old.inertia_a + s.gamma * inertia_a),
             damping_v=damping_v0 + h * s.gamma * damping_a,
             slip=solved.contact.slip,
-            history=np.concatenate([u[None], old.history[:2]]),
+            history=np.concatenate([u[None], old.history[: KEPT - 1]]),
         )
         return self._record(old, new, (solved.strain, solved.contact), loads, Effort(solved.iterations, substeps=1))
 
