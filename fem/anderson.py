@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from fem.arrays import BoolArray, FloatArray, IntArray
+from fem.arrays import FloatArray, IntArray
 from fem.compiled import threaded
 
 # Relative to the largest diagonal entry of the normal equations: keeps nearly parallel pairs from cancelling.
@@ -18,7 +18,7 @@ _REGULARISATION = 1e-10
 
 @threaded
 def _mix(
-    active: BoolArray,
+    live: IntArray,
     count: IntArray,
     dx: FloatArray,
     df: FloatArray,
@@ -26,17 +26,16 @@ def _mix(
     f: FloatArray,
     step: FloatArray,
 ) -> None:
-    """step = f - sum_j gamma_j (dx_j + df_j) with gamma = argmin abs(f - sum_j gamma_j df_j), for each active case."""
-    for c in prange(len(active)):
-        if not active[c]:
-            continue
+    """step = f - sum_j gamma_j (dx_j + df_j) with gamma = argmin abs(f - sum_j gamma_j df_j), for each live case."""
+    for column in prange(len(live)):
+        c = live[column]
         m = min(count[c], dx.shape[1])
         n = f.shape[0]
         right = np.zeros(m)
         for j in range(m):
             s = 0.0
             for i in range(n):
-                s += df[c, j, i] * f[i, c]
+                s += df[c, j, i] * f[i, column]
             right[j] = s
         A = np.zeros((m, m))
         scale = np.ones(m)
@@ -49,26 +48,25 @@ def _mix(
             right[j] *= scale[j]
         gamma = np.linalg.solve(A, right) * scale if m > 0 else right
         for i in range(n):
-            s = f[i, c]
+            s = f[i, column]
             for j in range(m):
                 s -= gamma[j] * (dx[c, j, i] + df[c, j, i])
-            step[i, c] = s
+            step[i, column] = s
 
 
 @threaded
 def _remember(
-    active: BoolArray, count: IntArray, dx: FloatArray, df: FloatArray, gram: FloatArray, x: FloatArray, f: FloatArray
+    live: IntArray, count: IntArray, dx: FloatArray, df: FloatArray, gram: FloatArray, x: FloatArray, f: FloatArray
 ) -> None:
-    """Put the pair (x, f) in the oldest place of each active case and update the Gram matrix of df."""
+    """Put the pair (x, f) in the oldest place of each live case and update the Gram matrix of df."""
     depth = dx.shape[1]
-    for c in prange(len(active)):
-        if not active[c]:
-            continue
+    for column in prange(len(live)):
+        c = live[column]
         place = count[c] % depth
         n = x.shape[0]
         for i in range(n):
-            dx[c, place, i] = x[i, c]
-            df[c, place, i] = f[i, c]
+            dx[c, place, i] = x[i, column]
+            df[c, place, i] = f[i, column]
         count[c] += 1
         for j in range(min(count[c], depth)):
             s = 0.0
@@ -87,14 +85,14 @@ class Anderson:
         self.gram = np.zeros((n_case, depth, depth))
         self.count = np.zeros(n_case, dtype=np.int64)
 
-    def remember(self, active: BoolArray, dx: FloatArray, df: FloatArray) -> None:
-        """Add one pair per active case; dx, df (n, n_case)."""
-        _remember(active, self.count, self.dx, self.df, self.gram, dx, df)
+    def remember(self, live: IntArray, dx: FloatArray, df: FloatArray) -> None:
+        """Add one pair to each case of ``live`` (n_live,); dx, df (n, n_live)."""
+        _remember(live, self.count, self.dx, self.df, self.gram, dx, df)
 
-    def step(self, active: BoolArray, f: FloatArray) -> FloatArray:
-        """Accelerated steps (n, n_case) from residuals f (n, n_case); zero for inactive cases."""
-        step = np.zeros_like(f)
-        _mix(active, self.count, self.dx, self.df, self.gram, f, step)
+    def step(self, live: IntArray, f: FloatArray) -> FloatArray:
+        """Accelerated steps (n, n_live) of the cases ``live`` (n_live,) from their residuals f (n, n_live)."""
+        step = np.empty_like(f)
+        _mix(live, self.count, self.dx, self.df, self.gram, f, step)
         return step
 
     def forget(self) -> None:

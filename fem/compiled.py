@@ -29,3 +29,11 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 def threaded(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a loop whose ``prange`` iterations are independent, and share them out to all threads."""
     return cast("Callable[P, R]", numba.njit(cache=True, fastmath=_SIMD, parallel=True)(function))
+
+
+def threaded_gather(function: Callable[P, R]) -> Callable[P, R]:
+    """``threaded`` for sums over scattered entries: sums keep their order.
+
+    Reordering lets the compiler load such entries with vector gathers, which is four to nine times slower here.
+    """
+    return cast("Callable[P, R]", numba.njit(cache=True, fastmath={"contract"}, parallel=True)(function))

@@ -8,24 +8,35 @@ with the frozen factor A does the work of a new factor.
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numba import prange
 
-from fem.arrays import FloatArray
-from fem.compiled import threaded
+from fem.arrays import FloatArray, IntArray
+from fem.compiled import threaded, threaded_gather
 from fem.model import Model
-from fem.sparse_product import SparseProduct
 
 
 class NodalRotation:
     """Rotation vectors w = curl(u) / 2 averaged over the cells around each node; zero for linear bodies."""
 
     def __init__(self, model: Model) -> None:
-        self._half_curl = SparseProduct(_half_curl(model))
+        volume = np.zeros(len(model.points))
+        parts = []
+        for cells in model.nonlinear:
+            # Volume integrals of the shape gradients, given to every node of the cell.
+            integrals = np.ascontiguousarray(np.einsum("eq,eqja->eja", cells.weights, cells.gradients))
+            parts.append((integrals, cells.nodes, cells.pointers, cells.entries // cells.nodes.shape[1]))
+            np.add.at(volume, cells.nodes, cells.weights.sum(axis=1)[:, None])
+        self._parts = tuple(parts)
+        self._scale = np.where(volume > 0.0, 0.5 / np.where(volume > 0.0, volume, 1.0), 0.0)
 
     def __call__(self, u: FloatArray) -> FloatArray:
         """Rotation vectors (3 n_node, n_case) in rad at u (n_dof, n_case)."""
-        return self._half_curl(u)
+        w = np.zeros_like(u)
+        for integrals, nodes, pointers, around in self._parts:
+            curls = np.empty((len(nodes), 3, u.shape[1]))
+            _cell_curls(integrals, nodes, u, curls)
+            _node_averages(pointers, around, self._scale, curls, w)
+        return w
 
 
 @threaded
@@ -54,23 +65,27 @@ def rotate(w: FloatArray, sign: float, x: FloatArray) -> FloatArray:
     return out
 
 
-def _half_curl(model: Model) -> sp.csr_matrix:
-    n_node = len(model.points)
-    total = sp.csr_matrix((3 * n_node, 3 * n_node))
-    volume = np.zeros(n_node)
-    for cells in model.nonlinear:
-        n_local = cells.nodes.shape[1]
-        # Volume integrals of the shape gradients, given to every node of the cell.
-        integral = np.einsum("eq,eqja->eja", cells.weights, cells.gradients)
-        rows = np.repeat(cells.nodes, n_local, axis=1).ravel()
-        columns = np.tile(cells.nodes, (1, n_local)).ravel()
-        gradient = [np.tile(integral[:, j, :], (1, n_local)).ravel() for j in range(3)]
-        # (curl u)_i = d_j u_k - d_k u_j
-        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            data = 0.5 * np.concatenate([gradient[j], -gradient[k]])
-            row = np.concatenate([3 * rows + i, 3 * rows + i])
-            column = np.concatenate([3 * columns + k, 3 * columns + j])
-            total = total + sp.csr_matrix((data, (row, column)), shape=total.shape)
-        np.add.at(volume, cells.nodes, cells.weights.sum(axis=1)[:, None])
-    scale = np.where(volume > 0.0, 1.0 / np.where(volume > 0.0, volume, 1.0), 0.0)
-    return (sp.diags(np.repeat(scale, 3)) @ total).tocsr()
+@threaded_gather
+def _cell_curls(integrals: FloatArray, nodes: IntArray, u: FloatArray, curls: FloatArray) -> None:
+    """Volume integral of (curl u)_i = d_j u_k - d_k u_j over every cell, (n_cell, 3, n_case)."""
+    for e in prange(len(nodes)):
+        for c in range(u.shape[1]):
+            p, q, r = 0.0, 0.0, 0.0
+            for a in range(nodes.shape[1]):
+                gx, gy, gz = integrals[e, 0, a], integrals[e, 1, a], integrals[e, 2, a]
+                k = 3 * nodes[e, a]
+                x, y, z = u[k, c], u[k + 1, c], u[k + 2, c]
+                p += gy * z - gz * y
+                q += gz * x - gx * z
+                r += gx * y - gy * x
+            curls[e, 0, c], curls[e, 1, c], curls[e, 2, c] = p, q, r
+
+
+@threaded_gather
+def _node_averages(pointers: IntArray, around: IntArray, scale: FloatArray, curls: FloatArray, w: FloatArray) -> None:
+    """w += scale times the sum over the cells around each node."""
+    for node in prange(len(pointers) - 1):
+        for k in range(pointers[node], pointers[node + 1]):
+            for i in range(3):
+                for c in range(w.shape[1]):
+                    w[3 * node + i, c] += scale[node] * curls[around[k], i, c]

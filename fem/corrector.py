@@ -6,14 +6,16 @@ factored in every iteration, is the reference that the first is tested against.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from fem.anderson import Anderson
-from fem.arrays import FloatArray
+from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError
 from fem.linear_solver import make_solver
@@ -51,37 +53,50 @@ class Corrector:
         self,
         equation: StepEquation,
         problem: StepProblem,
-        solve: Callable[[FloatArray], FloatArray],
+        solve: Callable[[FloatArray, IntArray], FloatArray],
         anderson: Anderson,
     ) -> SolvedStep:
-        """Anderson-accelerated iteration with the preconditioner ``solve`` on all cases together."""
-        a, mask = problem.guess, equation.dynamics.mask
-        iterations = np.zeros(a.shape[1], dtype=np.int64)
+        """Anderson-accelerated iteration on all cases together; each leaves when it has converged.
+
+        ``solve`` preconditions residuals (n_dof, n_live) of the cases (n_live,).
+        """
+        a, live = problem.guess, np.arange(problem.guess.shape[1])
         anderson.forget()
         step = previous = None
         history: list[float] = []
-        for _ in range(self.max_iterations):
+        found: list[tuple[IntArray, SolvedStep]] = []
+        for iteration in range(self.max_iterations):
             trial = equation.evaluate(a, problem)
             size = self.size(trial.residual)
             history.append(float(size.max()))
             active = ~(size <= self.tolerance)
-            if not active.any():
-                return _solved(a, trial, iterations)
+            if not active.all():
+                solved = _solved(a, trial, np.full(len(live), iteration))
+                found.append((live[~active], solved if not active.any() else _chosen(solved, np.flatnonzero(~active))))
+                if not active.any():
+                    return _joined(found)
             if not history[-1] < DIVERGED:
                 break
-            correction = -solve(trial.residual) * mask
+            residual = trial.residual
+            if not active.all():
+                kept = np.flatnonzero(active)
+                problem, live = problem.cases(kept), live[kept]
+                a, residual = (np.ascontiguousarray(x[:, kept]) for x in (a, residual))
+                if step is not None and previous is not None:
+                    step, previous = (np.ascontiguousarray(x[:, kept]) for x in (step, previous))
+            correction = -solve(residual, live) * equation.dynamics.mask
             if step is not None and previous is not None:
-                anderson.remember(active, step, correction - previous)
-            step = anderson.step(active, correction)
+                anderson.remember(live, step, correction - previous)
+            step = anderson.step(live, correction)
             previous = correction
             a = a + step
-            iterations += active
         raise self.failure(problem, history)
 
     def newton(self, equation: StepEquation, problem: StepProblem, solver: str) -> SolvedStep:
         """Full Newton with the consistent tangent, one case after the other."""
         n_case = problem.guess.shape[1]
-        return _joined([self._newton(equation, problem.case(c), solver) for c in range(n_case)])
+        cases = [np.array([c]) for c in range(n_case)]
+        return _joined([(case, self._newton(equation, problem.cases(case), solver)) for case in cases])
 
     def _newton(self, equation: StepEquation, problem: StepProblem, solver: str) -> SolvedStep:
         a = problem.guess
@@ -126,19 +141,33 @@ def consistent_matrix(equation: StepEquation, problem: StepProblem, a: FloatArra
     return equation.matrix(stiffness.tocsr(), viscous.tocsr())
 
 
-def _solved(a: FloatArray, trial: Trial, iterations: np.ndarray) -> SolvedStep:
-    return SolvedStep(a, trial.force, trial.viscous, trial.strain, trial.contact, iterations)
+def _solved(a: FloatArray, trial: Trial, iterations: IntArray) -> SolvedStep:
+    forces = (trial.inertia_a, trial.damping_a, trial.force, trial.viscous)
+    return SolvedStep(a, *forces, trial.strain, trial.contact, iterations)
 
 
-def _joined(parts: list[SolvedStep]) -> SolvedStep:
-    """The cases side by side."""
+def _chosen(solved: SolvedStep, columns: IntArray) -> SolvedStep:
+    """Some of the cases."""
+    return _rearranged([solved], columns)
+
+
+def _joined(parts: list[tuple[IntArray, SolvedStep]]) -> SolvedStep:
+    """The cases side by side in their order, from groups of cases that were solved together."""
+    if len(parts) == 1:
+        return parts[0][1]
+    return _rearranged([solved for _, solved in parts], np.argsort(np.concatenate([cases for cases, _ in parts])))
+
+
+def _rearranged(parts: list[SolvedStep], columns: IntArray) -> SolvedStep:
+    """Columns of the parts side by side."""
+
+    def pick(arrays: Iterable[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        return np.ascontiguousarray(np.concatenate(list(arrays), axis=-1)[..., columns])
+
     contact = ContactState(
-        np.concatenate([p.contact.traction for p in parts], axis=1),
-        np.concatenate([p.contact.slip for p in parts], axis=2),
-        np.concatenate([p.contact.status for p in parts], axis=1),
+        traction=pick(part.contact.traction for part in parts),
+        slip=pick(part.contact.slip for part in parts),
+        status=pick(part.contact.status for part in parts),
     )
-    columns = {
-        name: np.ascontiguousarray(np.concatenate([getattr(p, name) for p in parts], axis=-1))
-        for name in ("a", "force", "viscous", "strain", "iterations")
-    }
-    return replace(parts[0], contact=contact, **columns)
+    names = (field.name for field in fields(SolvedStep) if field.name != "contact")
+    return SolvedStep(contact=contact, **{name: pick(getattr(part, name) for part in parts) for name in names})

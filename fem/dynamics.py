@@ -9,6 +9,7 @@ import numpy as np
 from fem.arrays import FloatArray
 from fem.contact import ContactState
 from fem.excitation import TimeLoad
+from fem.linear_operators import LinearOperators
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.modes import Rayleigh
@@ -38,13 +39,26 @@ class Dynamics:
         self.alpha, self.beta = damping.alpha, damping.beta
         self.mask = model.free[:, None].astype(float)
         self.damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
-        self.mass, self.damping = SparseProduct(model.mass), SparseProduct(self.damping_matrix)
+        self.linear = LinearOperators(model.mass, model.stiffness)
         self._gap = SparseProduct(model.contact.operator)
         self._pull = SparseProduct(model.contact.operator.T.tocsr())
         rest = equilibrium.u[:, None]
         strain = self.forces(rest, np.zeros_like(rest), equilibrium.contact)[2]
         stored = model.contact.stored_energy(equilibrium.contact.traction)
         self.rest_energies = np.stack([np.zeros(1), strain, stored])
+
+    def mass(self, x: FloatArray) -> FloatArray:
+        """M x (n_dof, n_case)."""
+        return self.linear(x)[0]
+
+    def damping(self, x: FloatArray) -> FloatArray:
+        """C x (n_dof, n_case)."""
+        return self.mass_and_damping(x)[1]
+
+    def mass_and_damping(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """M x and C x, each (n_dof, n_case)."""
+        mass_x, stiffness_x = self.linear(x)
+        return mass_x, self.alpha * mass_x + self.beta * stiffness_x
 
     def contact(self, u: FloatArray, slip: FloatArray) -> ContactState:
         """State of the interfaces at u (n_dof, n_case) after the history ``slip`` (n_point, 2, n_case)."""
@@ -53,8 +67,11 @@ class Dynamics:
     def forces(self, u: FloatArray, v: FloatArray, contact: ContactState) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Elastic plus contact force, viscous force of the Green-Lagrange bodies (n_dof, n_case), strain energy."""
         elastic, viscous, strain = self.model.body_forces(u, v, self.beta)
-        weighted = np.repeat(self.model.contact.area, 3)[:, None] * contact.traction
-        return elastic + self._pull(weighted), viscous, strain
+        return elastic + self.contact_force(contact), viscous, strain
+
+    def contact_force(self, contact: ContactState) -> FloatArray:
+        """Nodal forces of the interfaces, (n_dof, n_case) N."""
+        return self._pull(np.repeat(self.model.contact.area, 3)[:, None] * contact.traction)
 
     def load(self, t: float, n_case: int) -> FloatArray:
         """p(t) (n_dof, n_case) N: the dead loads of the model and all time functions."""
@@ -85,7 +102,7 @@ class Dynamics:
         self, u: FloatArray, v: FloatArray, a: FloatArray, forces: tuple[FloatArray, FloatArray], contact: ContactState
     ) -> MotionState:
         """The state from which a march starts at t = 0."""
-        products = (self.mass(a), self.damping(a), self.mass(v), self.damping(v))
+        products = (*self.mass_and_damping(a), *self.mass_and_damping(v))
         pace = Pace.beginning(u, contact.slip, self.size(u))
         work = np.zeros((3, u.shape[1]))
         return MotionState(0, u, v, a, *forces, *products, contact.slip, u[None].copy(), work, pace)

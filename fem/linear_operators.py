@@ -1,4 +1,4 @@
-"""Products with mass and constant stiffness in one pass: what an implicit step needs besides the nonlinear forces."""
+"""Products with mass and constant stiffness: what an implicit step needs besides the nonlinear forces."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numba import prange
 
 from fem.arrays import FloatArray, IntArray
-from fem.compiled import threaded
+from fem.compiled import threaded_gather
 from fem.errors import FemInputError
 
 
@@ -15,7 +15,7 @@ class LinearOperators:
     """x -> (M x, K x) for x (n_dof, n_case), sums in a fixed order.
 
     Mass acts alike in all directions and is kept as one number per pair of nodes, stiffness as blocks of 3 x 3: the
-    pass is bound by memory, and this halves what it reads.
+    products are bound by memory, and this reads a third and two thirds of what general sparse matrices read.
 
     Parameters
     ----------
@@ -32,35 +32,38 @@ class LinearOperators:
         self._mass = (scalar.indptr, scalar.indices, scalar.data)
         self._stiffness = (blocks.indptr, blocks.indices, np.ascontiguousarray(blocks.data))
 
+    def stiffness(self, x: FloatArray) -> FloatArray:
+        """K x (n_dof, n_case)."""
+        out = np.empty_like(x)
+        product = _blocks_one if x.shape[1] == 1 else _blocks
+        product(*self._stiffness, np.ascontiguousarray(x), out)
+        return out
+
     def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """M x and K x, each (n_dof, n_case)."""
-        mass_x, stiffness_x = np.empty_like(x), np.empty_like(x)
-        product = _products_one if x.shape[1] == 1 else _products
-        product(*self._mass, *self._stiffness, np.ascontiguousarray(x), mass_x, stiffness_x)
-        return mass_x, stiffness_x
+        mass_x = np.empty_like(x)
+        product = _scalars_one if x.shape[1] == 1 else _scalars
+        product(*self._mass, np.ascontiguousarray(x), mass_x)
+        return mass_x, self.stiffness(x)
 
 
-@threaded
-def _products_one(
-    mass_pointers: IntArray,
-    mass_columns: IntArray,
-    mass: FloatArray,
-    pointers: IntArray,
-    columns: IntArray,
-    blocks: FloatArray,
-    x: FloatArray,
-    mass_x: FloatArray,
-    stiffness_x: FloatArray,
-) -> None:
+@threaded_gather
+def _scalars_one(pointers: IntArray, columns: IntArray, mass: FloatArray, x: FloatArray, out: FloatArray) -> None:
     """One case: sums stay in registers."""
-    for node in prange(len(mass_pointers) - 1):
+    for node in prange(len(pointers) - 1):
         p, q, r = 0.0, 0.0, 0.0
-        for k in range(mass_pointers[node], mass_pointers[node + 1]):
-            j = 3 * mass_columns[k]
+        for k in range(pointers[node], pointers[node + 1]):
+            j = 3 * columns[k]
             p += mass[k] * x[j, 0]
             q += mass[k] * x[j + 1, 0]
             r += mass[k] * x[j + 2, 0]
-        mass_x[3 * node, 0], mass_x[3 * node + 1, 0], mass_x[3 * node + 2, 0] = p, q, r
+        out[3 * node, 0], out[3 * node + 1, 0], out[3 * node + 2, 0] = p, q, r
+
+
+@threaded_gather
+def _blocks_one(pointers: IntArray, columns: IntArray, blocks: FloatArray, x: FloatArray, out: FloatArray) -> None:
+    """One case: sums stay in registers."""
+    for node in prange(len(pointers) - 1):
         p, q, r = 0.0, 0.0, 0.0
         for k in range(pointers[node], pointers[node + 1]):
             j = 3 * columns[k]
@@ -68,36 +71,31 @@ def _products_one(
             p += blocks[k, 0, 0] * x0 + blocks[k, 0, 1] * x1 + blocks[k, 0, 2] * x2
             q += blocks[k, 1, 0] * x0 + blocks[k, 1, 1] * x1 + blocks[k, 1, 2] * x2
             r += blocks[k, 2, 0] * x0 + blocks[k, 2, 1] * x1 + blocks[k, 2, 2] * x2
-        stiffness_x[3 * node, 0], stiffness_x[3 * node + 1, 0], stiffness_x[3 * node + 2, 0] = p, q, r
+        out[3 * node, 0], out[3 * node + 1, 0], out[3 * node + 2, 0] = p, q, r
 
 
-@threaded
-def _products(
-    mass_pointers: IntArray,
-    mass_columns: IntArray,
-    mass: FloatArray,
-    pointers: IntArray,
-    columns: IntArray,
-    blocks: FloatArray,
-    x: FloatArray,
-    mass_x: FloatArray,
-    stiffness_x: FloatArray,
-) -> None:
+@threaded_gather
+def _scalars(pointers: IntArray, columns: IntArray, mass: FloatArray, x: FloatArray, out: FloatArray) -> None:
     """Several cases: the innermost loop runs over them."""
     n_case = x.shape[1]
-    for node in prange(len(mass_pointers) - 1):
-        for i in range(3 * node, 3 * node + 3):
-            for c in range(n_case):
-                mass_x[i, c] = 0.0
-                stiffness_x[i, c] = 0.0
-        for k in range(mass_pointers[node], mass_pointers[node + 1]):
-            m, j = mass[k], 3 * mass_columns[k]
+    for node in prange(len(pointers) - 1):
+        out[3 * node : 3 * node + 3] = 0.0
+        for k in range(pointers[node], pointers[node + 1]):
+            m, j = mass[k], 3 * columns[k]
             for i in range(3):
                 for c in range(n_case):
-                    mass_x[3 * node + i, c] += m * x[j + i, c]
+                    out[3 * node + i, c] += m * x[j + i, c]
+
+
+@threaded_gather
+def _blocks(pointers: IntArray, columns: IntArray, blocks: FloatArray, x: FloatArray, out: FloatArray) -> None:
+    """Several cases: the innermost loop runs over them."""
+    n_case = x.shape[1]
+    for node in prange(len(pointers) - 1):
+        out[3 * node : 3 * node + 3] = 0.0
         for k in range(pointers[node], pointers[node + 1]):
             j = 3 * columns[k]
             for i in range(3):
                 a, b, d = blocks[k, i, 0], blocks[k, i, 1], blocks[k, i, 2]
                 for c in range(n_case):
-                    stiffness_x[3 * node + i, c] += a * x[j, c] + b * x[j + 1, c] + d * x[j + 2, c]
+                    out[3 * node + i, c] += a * x[j, c] + b * x[j + 1, c] + d * x[j + 2, c]

@@ -95,9 +95,16 @@ class Model:
 
         The viscous force of linear bodies is beta times their constant stiffness times v and not part of this.
         """
-        elastic = SparseProduct(self.stiffness)(u)
-        viscous, energy = np.zeros_like(u), 0.5 * np.einsum("nc,nc->c", u, elastic)
-        for cells in self.nonlinear:
+        linear = SparseProduct(self.stiffness)(u)
+        elastic, viscous, energy = self.cell_forces(u, v, beta)
+        return elastic + linear, viscous, energy + 0.5 * np.einsum("nc,nc->c", u, linear)
+
+    def cell_forces(self, u: FloatArray, v: FloatArray, beta: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The part of ``body_forces`` that belongs to the Green-Lagrange bodies."""
+        if not self.nonlinear:
+            return np.zeros_like(u), np.zeros_like(u), np.zeros(u.shape[1])
+        elastic, viscous, energy = self.nonlinear[0].forces(u, v, beta)
+        for cells in self.nonlinear[1:]:
             f, g, e = cells.forces(u, v, beta)
             elastic, viscous, energy = elastic + f, viscous + g, energy + e
         return elastic, viscous, energy

@@ -121,9 +121,11 @@ class StepRecord:
 
 @dataclass(frozen=True)
 class SolvedStep:
-    """Acceleration of a converged step and what belongs to it."""
+    """Acceleration of a converged step and what belongs to it, see ``step_equation.Trial``."""
 
     a: FloatArray
+    inertia_a: FloatArray
+    damping_a: FloatArray
     force: FloatArray
     viscous: FloatArray
     strain: FloatArray

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fem.arrays import FloatArray
+from fem.arrays import FloatArray, IntArray
 from fem.corotation import NodalRotation, rotate
 from fem.linear_solver import LinearSolver, make_solver
 from fem.modes import ModalBasis
@@ -24,7 +24,7 @@ KEPT = 6
 """Factors kept in memory, least recently used dropped first; a dropped one is computed again, to the same bits."""
 
 _Key = tuple[int, bytes]
-Solve = Callable[[FloatArray], FloatArray]
+Solve = Callable[[FloatArray, IntArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -61,25 +61,24 @@ class Preconditioner:
         )
 
     def prepare(self, level: int, pace: Pace, u: FloatArray) -> Solve:
-        """r -> A^-1 r for residuals (n_dof, n_case) of a step that leads to about u (n_dof, n_case)."""
-        own = {int(case): number for number, case in enumerate(pace.anchored)}
-        common = [case for case in range(u.shape[1]) if case not in own]
-        solvers = [(np.array(common), self.rest(level), self._dynamics.equilibrium.u)] if common else []
-        for case, number in own.items():
-            solvers.append((np.array([case]), self._anchored(level, pace, number), pace.anchor_u[:, number]))
-        turned = [
-            (cases, solver, self._rotation(np.ascontiguousarray(u[:, cases]) - start[:, None]))
-            for cases, solver, start in solvers
-        ]
+        """(r, live) -> A^-1 r for r (n_dof, n_live) of the cases (n_live,), for a step to about u (n_dof, n_case)."""
+        n_case = u.shape[1]
+        start = np.repeat(self._dynamics.equilibrium.u[:, None], n_case, axis=1)
+        start[:, pace.anchored] = pace.anchor_u
+        groups = [(np.array([case]), self._anchored(level, pace, number)) for number, case in enumerate(pace.anchored)]
+        common = np.setdiff1d(np.arange(n_case), pace.anchored)
+        if len(common):
+            groups.append((common, self.rest(level)))
+        w = self._rotation(u - start)
 
-        def solve(residual: FloatArray) -> FloatArray:
-            if not own:
-                w = turned[0][2]
-                return rotate(w, 1.0, solvers[0][1].solve(rotate(w, -1.0, residual)))
+        def solve(residual: FloatArray, live: IntArray) -> FloatArray:
             result = np.empty_like(residual)
-            for cases, solver, w in turned:
-                back = rotate(w, -1.0, np.ascontiguousarray(residual[:, cases]))
-                result[:, cases] = rotate(w, 1.0, solver.solve(back).reshape(back.shape))
+            for cases, solver in groups:
+                columns = np.flatnonzero(np.isin(live, cases))
+                if len(columns):
+                    turn = np.ascontiguousarray(w[:, live[columns]])
+                    back = rotate(turn, -1.0, np.ascontiguousarray(residual[:, columns]))
+                    result[:, columns] = rotate(turn, 1.0, solver.solve(back).reshape(back.shape))
             return result
 
         return solve

@@ -7,10 +7,10 @@ import scipy.sparse as sp
 from numba import prange
 
 from fem.arrays import FloatArray, IntArray
-from fem.compiled import threaded
+from fem.compiled import threaded_gather
 
 
-@threaded
+@threaded_gather
 def _csr_times_block(indptr: IntArray, indices: IntArray, data: FloatArray, x: FloatArray, out: FloatArray) -> None:
     n_case = x.shape[1]
     for row in prange(len(indptr) - 1):

@@ -139,7 +139,8 @@ def rescaled(old: MotionState, dynamics: Dynamics, scheme: Scheme, interval: flo
         return old
     change = interval * (2.0**-level - 2.0**-old.pace.last_level)
     a = old.a + (scheme.alpha_m - scheme.alpha_f) * change * old.pace.jerk
-    return replace(old, a=a, inertia_a=dynamics.mass(a), damping_a=dynamics.damping(a), history=old.history[:1])
+    inertia_a, damping_a = dynamics.mass_and_damping(a)
+    return replace(old, a=a, inertia_a=inertia_a, damping_a=damping_a, history=old.history[:1])
 
 
 def too_small(old: MotionState, error: float, step: float) -> FemConvergenceError:

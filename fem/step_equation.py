@@ -13,48 +13,48 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from fem.arrays import FloatArray
+from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
 from fem.dynamics import Dynamics
 from fem.generalized_alpha import Scheme
 from fem.modes import ModalBasis
 from fem.motion import Effort, MotionState, SolvedStep, StepRecord
-from fem.sparse_product import SparseProduct
 
-
-KEPT = 3
+KEPT = 4
+"""Displacements that the next one is extrapolated from; with more, the noise of the tolerance outweighs the gain."""
 
 
 @dataclass(frozen=True)
 class StepProblem:
     """r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0 for the a at the end of the step.
 
-    Fields (n_dof, n_case); ``slip`` (n_point, 2, n_case) at the beginning; ``guess`` the a to start from; ``number``
-    of the output that the step leads to.
+    Fields (n_dof, n_case); ``linear`` the force K u0 of the linear bodies; ``slip`` (n_point, 2, n_case) at the
+    beginning; ``guess`` the a to start from; ``number`` of the output that the step leads to.
     """
 
     u0: FloatArray
     v0: FloatArray
     constant: FloatArray
+    linear: FloatArray
     slip: FloatArray
     guess: FloatArray
     number: int
 
-    def case(self, c: int) -> StepProblem:
-        """The problem of one case alone."""
-        u0, v0, constant, guess = (
-            np.ascontiguousarray(x[:, c : c + 1]) for x in (self.u0, self.v0, self.constant, self.guess)
-        )
-        return StepProblem(u0, v0, constant, np.ascontiguousarray(self.slip[:, :, c : c + 1]), guess, self.number)
+    def cases(self, chosen: IntArray) -> StepProblem:
+        """The problem of some cases alone."""
+        fields = (self.u0, self.v0, self.constant, self.linear, self.slip, self.guess)
+        u0, v0, constant, linear, slip, guess = (np.ascontiguousarray(x[..., chosen]) for x in fields)
+        return StepProblem(u0, v0, constant, linear, slip, guess, self.number)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Forces, strain energy, contact and residual (n_dof, n_case) N at one a."""
+    """Forces, M a, C a, contact and residual, all (n_dof, n_case) N, and strain energy (n_case,) J at one a."""
 
-    u: FloatArray
     force: FloatArray
     viscous: FloatArray
+    inertia_a: FloatArray
+    damping_a: FloatArray
     strain: FloatArray
     contact: ContactState
     residual: FloatArray
@@ -74,7 +74,6 @@ class StepEquation:
         self._linear = (1.0 - scheme.alpha_m) * dynamics.model.mass + (
             1.0 - scheme.alpha_f
         ) * step * scheme.gamma * dynamics.damping_matrix
-        self._product = SparseProduct(self._linear)
         ratios = [scheme.frequency_corrected_inertia(float(omega), step) for omega in modes.omega[:corrected]]
         # Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,).
         self.correction = modes.left[:, :corrected], np.array(ratios)
@@ -103,25 +102,34 @@ class StepEquation:
             - (1.0 - s.alpha_f) * p_new
         )
         v0 = old.v + h * (1.0 - s.gamma) * old.a
-        return StepProblem(u0, v0, constant, old.slip, (guess - u0) / (h * h * s.beta), old.step + 1)
+        linear = self.dynamics.linear.stiffness(u0)
+        return StepProblem(u0, v0, constant, linear, old.slip, (guess - u0) / (h * h * s.beta), old.step + 1)
 
     def evaluate(self, a: FloatArray, problem: StepProblem) -> Trial:
         """Residual of the equation at a (n_dof, n_case) m/s^2."""
         h, s, dynamics = self.step, self.scheme, self.dynamics
+        inertia, stiffness = dynamics.linear(a)
         u = problem.u0 + h * h * s.beta * a
+        v = problem.v0 + h * s.gamma * a
         contact = dynamics.contact(u, problem.slip)
-        force, viscous, strain = dynamics.forces(u, problem.v0 + h * s.gamma * a, contact)
-        inertia = self._product(a) + (1.0 - s.alpha_m) * self.correct_inertia(a)
-        residual = (inertia + (1.0 - s.alpha_f) * (force + viscous) + problem.constant) * dynamics.mask
-        return Trial(u, force, viscous, strain, contact, residual)
+        force, viscous, strain = dynamics.model.cell_forces(u, v, dynamics.beta)
+        linear = problem.linear + h * h * s.beta * stiffness
+        strain += 0.5 * np.einsum("nc,nc->c", u, linear)
+        force += linear
+        force += dynamics.contact_force(contact)
+        damping = dynamics.alpha * inertia + dynamics.beta * stiffness
+        residual = (1.0 - s.alpha_m) * (inertia + self.correct_inertia(a)) + problem.constant
+        residual += (1.0 - s.alpha_f) * (h * s.gamma * damping + force + viscous)
+        residual *= dynamics.mask
+        return Trial(force, viscous, inertia, damping, strain, contact, residual)
 
     def finish(
         self, old: MotionState, problem: StepProblem, solved: SolvedStep, loads: tuple[FloatArray, FloatArray]
     ) -> StepRecord:
         """The record at the end of the step; the pace of the state is still that of its beginning."""
-        h, s, dynamics = self.step, self.scheme, self.dynamics
+        h, s = self.step, self.scheme
         a = solved.a
-        inertia_a, damping_a = dynamics.mass(a), dynamics.damping(a)
+        inertia_a, damping_a = solved.inertia_a, solved.damping_a
         damping_v0 = old.damping_v + h * (1.0 - s.gamma) * old.damping_a
         u = problem.u0 + h * h * s.beta * a
         new = replace(
@@ -155,6 +163,8 @@ class StepEquation:
         a = old.a + rise
         contact = dynamics.contact(u, old.slip)
         force, viscous, strain = dynamics.forces(u, v, contact)
+        inertia_a, damping_a = dynamics.mass_and_damping(a)
+        inertia_v, damping_v = dynamics.mass_and_damping(v)
         mid = replace(
             old,
             u=u,
@@ -162,10 +172,10 @@ class StepEquation:
             a=a,
             force=force,
             viscous=viscous,
-            inertia_a=dynamics.mass(a),
-            damping_a=dynamics.damping(a),
-            inertia_v=dynamics.mass(v),
-            damping_v=dynamics.damping(v),
+            inertia_a=inertia_a,
+            damping_a=damping_a,
+            inertia_v=inertia_v,
+            damping_v=damping_v,
             slip=contact.slip,
         )
         return self._record(old, mid, (strain, contact), loads, Effort.none(u.shape[1]))
