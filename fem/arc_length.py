@@ -13,6 +13,7 @@ from fem.errors import FemConvergenceError
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.modes import rest_state
+from fem.newton import internal_force
 from fem.preload import StaticState
 from fem.rigid_motion import check_restraint
 
@@ -83,7 +84,7 @@ def follow_path(
 
     Parameters
     ----------
-    load : p, (n_dof,) N.
+    load : p, (n_dof,) N; supports stay where ``start`` has them.
     start : equilibrium at load factor 0; none: the undeformed state.
     stop : from u (n_dof,) and lambda; the path ends at the first point where it is True. None: where lambda first
         reaches 1, at exactly 1.
@@ -176,9 +177,8 @@ class _Path:
         model, slip = self._model, here.contact.slip
         u, factor = here.u + length * here.du, here.factor + length * here.dfactor
         for iteration in range(self._settings.max_iterations):
-            contact = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
-            force = model.elastic_force(u[:, None])[0] + model.contact.force(contact.traction)
-            residual = np.where(model.free, factor * self._load - force[:, 0], 0.0)
+            force, contact = internal_force(model, u, slip)
+            residual = np.where(model.free, factor * self._load - force, 0.0)
             size = float(np.linalg.norm(residual))
             if not np.isfinite(size):
                 return None
@@ -199,9 +199,8 @@ class _Path:
         model, slip = self._model, here.contact.slip
         u = here.u + share * (there.u - here.u)
         for _ in range(self._settings.max_iterations):
-            contact = model.contact.evaluate(model.contact.relative(u[:, None]), slip)
-            force = model.elastic_force(u[:, None])[0] + model.contact.force(contact.traction)
-            residual = np.where(model.free, self._load - force[:, 0], 0.0)
+            force, contact = internal_force(model, u, slip)
+            residual = np.where(model.free, self._load - force, 0.0)
             to_residual, to_load = self._solve(u, slip, [residual, self._load])
             if float(np.linalg.norm(residual)) <= self._settings.tolerance * self._size:
                 return _Point(u, 1.0, contact, *self._unit(to_load, 1.0))
