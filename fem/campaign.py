@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,7 +25,9 @@ class Marching(Protocol):
     equilibrium: StaticState
     rest_energies: FloatArray
 
-    def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
+    def start(
+        self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None, *, settled: bool = False
+    ) -> MotionState:
         """State at t = 0."""
 
     def observe(self, state: MotionState) -> StepRecord:
@@ -44,11 +46,13 @@ class Starts:
     displacement : (n_dof, n_case) m from the equilibrium.
     slip : (n_point, 2, n_case) m, slip history of the interfaces.
     velocity : (n_dof, n_case) m/s, None at rest.
+    settled : only slow modes are out of balance, see ``Transient.start``.
     """
 
     displacement: FloatArray
     slip: FloatArray
     velocity: FloatArray | None = None
+    settled: bool = False
 
 
 @dataclass(frozen=True)
@@ -107,12 +111,13 @@ def modal_coordinates(modes: ModalBasis, peaks: Sequence[float]) -> FloatArray:
 def modal_starts(modes: ModalBasis, equilibrium: StaticState, etas: Sequence[FloatArray]) -> Starts:
     """Displacements along the mode shapes, u = Phi eta: everything else has to settle after the release."""
     displacement = np.stack([modes.shapes[:, : len(eta)] @ eta for eta in etas], axis=1)
-    return moving_starts(equilibrium, displacement, None)
+    return replace(moving_starts(equilibrium, displacement, None), settled=False)
 
 
 def moving_starts(equilibrium: StaticState, displacement: FloatArray, velocity: FloatArray | None) -> Starts:
-    """Any displacement and velocity (n_dof, n_case), with the slip history of the equilibrium."""
-    return Starts(displacement, np.repeat(equilibrium.contact.slip, displacement.shape[1], axis=2), velocity)
+    """A displacement and velocity (n_dof, n_case) of a slow motion, with the slip history of the equilibrium."""
+    slip = np.repeat(equilibrium.contact.slip, displacement.shape[1], axis=2)
+    return Starts(displacement, slip, velocity, settled=True)
 
 
 def snap_back_starts(
@@ -131,7 +136,7 @@ def snap_back_starts(
             progress(number / len(etas))
     displacement = np.stack([s.u - transient.equilibrium.u for s in states], axis=1)
     slip = np.concatenate([s.contact.slip for s in states], axis=2)
-    return Starts(displacement, slip)
+    return Starts(displacement, slip, settled=True)
 
 
 def march_campaign(
@@ -155,7 +160,7 @@ def march_campaign(
         if starts is None:
             raise FemInputError("a campaign needs starts or a restart state", where="campaign")
         velocity = np.zeros_like(starts.displacement) if starts.velocity is None else starts.velocity
-        state = transient.start(starts.displacement, velocity, starts.slip)
+        state = transient.start(starts.displacement, velocity, starts.slip, settled=starts.settled)
         rows.append(_observe(transient.observe(state), transient, observation))
     while state.step < n_step:
         failure = None

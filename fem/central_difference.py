@@ -94,8 +94,13 @@ class ExplicitTransient:
         self.dynamics = Dynamics(self.model, equilibrium, damping, (*loads, *base))
         self.rest_energies = self.dynamics.rest_energies
 
-    def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
-        """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case)."""
+    def start(
+        self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None, *, settled: bool = False
+    ) -> MotionState:
+        """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case).
+
+        All modes are resolved, ``settled`` or not.
+        """
         return self.dynamics.start(displacement, velocity, slip, self.settings.solver)
 
     def observe(self, state: MotionState) -> StepRecord:

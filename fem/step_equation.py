@@ -17,7 +17,6 @@ from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
 from fem.dynamics import Dynamics
 from fem.generalized_alpha import Scheme
-from fem.modes import ModalBasis
 from fem.motion import Effort, MotionState, SolvedStep, StepRecord
 
 KEPT = 4
@@ -65,18 +64,17 @@ class StepEquation:
 
     Parameters
     ----------
-    corrected : number of modes that get the inertia with which the scheme oscillates at their true frequency.
+    correction : left vectors M phi_j (n_dof, k) of the corrected modes and their relative extra inertia r_j (k,).
     """
 
-    def __init__(self, dynamics: Dynamics, scheme: Scheme, step: float, modes: ModalBasis, corrected: int) -> None:
-        self.dynamics, self.scheme, self.step = dynamics, scheme, step
+    def __init__(
+        self, dynamics: Dynamics, scheme: Scheme, step: float, correction: tuple[FloatArray, FloatArray]
+    ) -> None:
+        self.dynamics, self.scheme, self.step, self.correction = dynamics, scheme, step, correction
         # What is linear in a_(n+1) acts through one matrix: mass, its damping, and the damping of the linear bodies.
         self._linear = (1.0 - scheme.alpha_m) * dynamics.model.mass + (
             1.0 - scheme.alpha_f
         ) * step * scheme.gamma * dynamics.damping_matrix
-        ratios = [scheme.frequency_corrected_inertia(float(omega), step) for omega in modes.omega[:corrected]]
-        # Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,).
-        self.correction = modes.left[:, :corrected], np.array(ratios)
 
     def matrix(self, stiffness: sp.csr_matrix, viscous: sp.csr_matrix) -> sp.csr_matrix:
         """d r / d a without the low-rank inertia, from d f / d u and d f / d v in N/m and N s/m, constrained."""

@@ -42,7 +42,8 @@ class TransientSettings:
     max_iterations : per step; more halve it.
     depth : pairs kept by Anderson acceleration.
     dispersion_correction : give the first modes ``corrected_modes`` the inertia with which the scheme oscillates at
-        their true frequency; the error in their frequency is then of fourth instead of second order in the step.
+        their true frequency; the error in their frequency is then of fourth instead of second order in the step. Not
+        with adaptive steps.
     corrected_modes : how many.
     solver : linear solver by name.
     method : "anderson" on a frozen factor, or "newton" with the consistent tangent factored in every iteration.
@@ -104,17 +105,17 @@ class Transient:
         base_acceleration: Amplitude | None = None,
         base_direction: str = "y",
     ) -> None:
-        self.model, self.equilibrium, self.settings, self.modes = model, equilibrium, settings, modes
+        self.model, self.equilibrium, self.settings = model, equilibrium, settings
         self.scheme = Scheme.from_radius(settings.spectral_radius)
         base = () if base_acceleration is None else (base_load(model, base_direction, base_acceleration),)
         self.dynamics = Dynamics(model, equilibrium, damping, (*loads, *base))
         self.rest_energies = self.dynamics.rest_energies
-        self._corrected = settings.corrected_modes if settings.dispersion_correction else 0
+        self._correction = self._modal_inertia(modes)
         self._equations: dict[int, StepEquation] = {}
         self._corrector = Corrector(settings.tolerance, force_scale, settings.max_iterations)
         self._control = StepControl(
             settings.max_cutbacks,
-            self._coarsest(),
+            0 if settings.error_tolerance is None else -settings.max_doublings,
             settings.error_tolerance,
             settings.max_iterations,
             settings.refactor_above if settings.method == "anderson" else 0,
@@ -123,13 +124,24 @@ class Transient:
         if settings.method == "anderson":
             self._preconditioner.rest(0)
 
-    def start(self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None) -> MotionState:
+    def start(
+        self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None, *, settled: bool = False
+    ) -> MotionState:
         """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case).
 
-        The slip history (n_point, 2, n_case) defaults to that of the equilibrium; the acceleration solves M a = p - f -
-        C v.
+        The slip history (n_point, 2, n_case) defaults to that of the equilibrium. ``settled`` starts, where only slow
+        two roots are equal there, so that an acceleration to start with grows as n rho^n before it decays.
+        C v, which leaves slow modes alone to O((omega h)^2) and quiets those that the step does not resolve: their two
+        roots are equal there, so that an acceleration they start with grows as n rho^n before it decays.
         """
-        return self.dynamics.start(displacement, velocity, slip, self.settings.solver)
+        state = self.dynamics.start(displacement, velocity, slip, self.settings.solver)
+        if settled:
+            return state
+        solve = self._preconditioner.prepare(0, state.pace, state.u)
+        net = state.inertia_a * self.dynamics.mask
+        a = (1.0 - self.scheme.alpha_m) * solve(net, np.arange(net.shape[1])) * self.dynamics.mask
+        inertia_a, damping_a = self.dynamics.mass_and_damping(a)
+        return replace(state, a=a, inertia_a=inertia_a, damping_a=damping_a)
 
     def observe(self, state: MotionState) -> StepRecord:
         """The record of a state that no step led to (t = 0)."""
@@ -166,21 +178,22 @@ class Transient:
         """Acceleration correction A^-1 r of the frozen factor, (n_dof, n_case) from forces (n_dof, n_case)."""
         return self._preconditioner.rest(0).solve(residual)
 
-    def _coarsest(self) -> int:
-        """Negative number of doublings: none for fixed steps, and only while the corrected modes are resolved."""
-        if self.settings.error_tolerance is None:
-            return 0
-        doublings = self.settings.max_doublings
-        fastest = self.modes.omega[: self._corrected].max(initial=0.0) * self.settings.time_step
-        while doublings and fastest * 2.0**doublings > 1.0:
-            doublings -= 1
-        return -doublings
+    def _modal_inertia(self, modes: ModalBasis) -> tuple[FloatArray, FloatArray]:
+        """Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,).
+
+        Steps of all sizes share it: an inertia that changed with the step would change the energy of the mode.
+        """
+        adaptive = self.settings.error_tolerance is not None
+        count = self.settings.corrected_modes if self.settings.dispersion_correction and not adaptive else 0
+        h = self.settings.time_step
+        ratios = [self.scheme.frequency_corrected_inertia(float(omega), h) for omega in modes.omega[:count]]
+        return modes.left[:, :count], np.array(ratios)
 
     def _equation(self, level: int) -> StepEquation:
         """The equation of steps of ``time_step`` / 2^level."""
         if level not in self._equations:
             step = self.settings.time_step * 2.0**-level
-            self._equations[level] = StepEquation(self.dynamics, self.scheme, step, self.modes, self._corrected)
+            self._equations[level] = StepEquation(self.dynamics, self.scheme, step, self._correction)
         return self._equations[level]
 
     def _accepted(self, state: MotionState, anderson: Anderson) -> tuple[StepRecord, int]:

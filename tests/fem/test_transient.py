@@ -31,7 +31,7 @@ def make_transient(strip: Strip, **options: object) -> Transient:
 def released(strip: Strip, transient: Transient) -> MotionState:
     """The held strip let go at rest."""
     displacement = (strip.held.u - strip.equilibrium.u)[:, None]
-    return transient.start(displacement, np.zeros_like(displacement), strip.held.contact.slip)
+    return transient.start(displacement, np.zeros_like(displacement), strip.held.contact.slip, settled=True)
 
 
 def _newton_step(strip: Strip, transient: Transient, old: MotionState) -> np.ndarray:

@@ -101,13 +101,13 @@ def _frictional(h: float, n: int) -> tuple[CampaignSegment, float, np.ndarray]:
     settings = TransientSettings(h, 0.9, tolerance=1e-6, corrected_modes=1, solver=SOLVER)
     transient = Transient(model, rest, modes, rayleigh(modes, (0, 1), (0.004, 0.004)), settings, force_scale=scale)
     held = hold_modes(model, rest, modes, eta, solver=SOLVER)
-    starts = Starts((held.u - rest.u)[:, None], held.contact.slip)
+    starts = Starts((held.u - rest.u)[:, None], held.contact.slip, settled=True)
     observation = Observation(modes, np.zeros((0, model.n_dof)), 10**6)
     (segment,) = march_campaign(transient, observation, n, n, starts=starts)
     quiet = float(model.elastic_force(rest.u[:, None])[1][0] + model.contact.stored_energy(rest.contact.traction)[0])
     at_rest = quiet - float(model.load @ rest.u)
     start = float(segment.energies[0, 1:3, 0].sum()) - float(model.load @ held.u)
-    state = transient.start(starts.displacement, 0.0 * starts.displacement, starts.slip)
+    state = transient.start(starts.displacement, 0.0 * starts.displacement, starts.slip, settled=True)
     return segment, start - at_rest, _shear_work(model, transient, state, n)
 
 
