@@ -130,9 +130,9 @@ class Transient:
         """State at t = 0 for displacement from the equilibrium and velocity, both (n_dof, n_case).
 
         The slip history (n_point, 2, n_case) defaults to that of the equilibrium. ``settled`` starts, where only slow
-        two roots are equal there, so that an acceleration to start with grows as n rho^n before it decays.
-        C v, which leaves slow modes alone to O((omega h)^2) and quiets those that the step does not resolve: their two
-        roots are equal there, so that an acceleration they start with grows as n rho^n before it decays.
+        modes are out of balance, take the acceleration from M a = p - f - C v. All others take
+        (M + c h^2 K) a = p - f - C v, which leaves slow modes alone to O((omega h)^2) and quiets those that the step
+        does not resolve: they have a double root, so that what they start with grows as n rho^n before it decays.
         """
         state = self.dynamics.start(displacement, velocity, slip, self.settings.solver)
         if settled:
