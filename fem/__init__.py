@@ -8,13 +8,15 @@ from fem.block import graded, hex_block
 from fem.bolt import Bolt
 from fem.errors import FemConvergenceError, FemError, FemInputError
 from fem.interfaces import Pair, Tie
-from fem.loads import Clamp, Force, Gravity, PointForce, Traction
+from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
 from fem.material import Material
+from fem.merge import merged
 from fem.mesh import Mesh, within
 from fem.modal_quantities import effective_masses, mac, near_integer_ratios, participation_factors, total_masses
 from fem.model import Body, Model, build_model
 from fem.modes import ModalBasis, rayleigh, rest_state, solve_modes
 from fem.preload import StaticSettings, StaticState, solve_static
+from fem.reaction import reaction
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
 from fem.stress import integration_point_stress, nodal_stress
@@ -37,6 +39,7 @@ __all__ = [
     "Pair",
     "PathSettings",
     "PointForce",
+    "Pressure",
     "Sensor",
     "StaticSettings",
     "StaticState",
@@ -50,10 +53,12 @@ __all__ = [
     "hex_block",
     "integration_point_stress",
     "mac",
+    "merged",
     "near_integer_ratios",
     "nodal_stress",
     "participation_factors",
     "rayleigh",
+    "reaction",
     "read_mesh",
     "rest_state",
     "sensor_rows",

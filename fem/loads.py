@@ -26,6 +26,15 @@ class Clamp:
 
 
 @dataclass(frozen=True)
+class Pressure:
+    """A dead pressure in Pa against the outward normals of the undeformed surface."""
+
+    name: str
+    surface: str
+    pressure: float
+
+
+@dataclass(frozen=True)
 class Traction:
     """A dead load of equal density: ``density`` in N/m^2 on a surface, N/m on a line of nodes.
 
@@ -64,7 +73,7 @@ class Gravity:
     bodies: tuple[str, ...] = ()
 
 
-Load = Clamp | Traction | Force | PointForce | Gravity
+Load = Clamp | Pressure | Traction | Force | PointForce | Gravity
 
 
 @dataclass(frozen=True)
@@ -91,7 +100,7 @@ def load_vector(load: Load, assembly: Assembly) -> FloatArray:
 
 
 def _nodal(load: Load, assembly: Assembly) -> FloatArray:
-    if isinstance(load, Clamp):
+    if isinstance(load, Clamp | Pressure):
         return _pressure(load, assembly)
     if isinstance(load, Gravity):
         return _gravity(load, assembly)
@@ -109,11 +118,12 @@ def _nodal(load: Load, assembly: Assembly) -> FloatArray:
     return np.outer(share, load.density)
 
 
-def _pressure(load: Clamp, assembly: Assembly) -> FloatArray:
+def _pressure(load: Clamp | Pressure, assembly: Assembly) -> FloatArray:
     index, surface = locate(assembly.bodies, load.surface)
     facets = assembly.bodies[index].mesh.surface(surface) + assembly.offsets[index]
     at = surface_points(assembly.points, facets)
-    density = -load.total_force / at.area.sum() * at.area[:, None] * at.normals
+    pressure = load.pressure if isinstance(load, Pressure) else load.total_force / at.area.sum()
+    density = -pressure * at.area[:, None] * at.normals
     nodal = np.zeros((len(assembly.points), 3))
     np.add.at(nodal, at.nodes, at.shape[:, :, None] * density[:, None, :])
     return nodal

@@ -15,7 +15,7 @@ from fem.bolt import Bolt, BoltSet, bolt_set, cut_bolts
 from fem.contact import Contact, join
 from fem.errors import FemInputError
 from fem.interfaces import Pair, Tie, bond_stiffness, default_penalty, pair_contact, tie_bond
-from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Traction, load_vector
+from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Pressure, Traction, load_vector
 from fem.sparse_product import SparseProduct
 from fem.supports import AXES, Support, held
 
@@ -29,6 +29,7 @@ __all__ = [
     "Model",
     "Pair",
     "PointForce",
+    "Pressure",
     "Support",
     "Tie",
     "Traction",

@@ -16,7 +16,7 @@ from fem.loads import Load
 from fem.material import Material
 from fem.mesh import Mesh, within
 from fem.modal_quantities import effective_masses, total_masses
-from fem.model import Body, Clamp, Gravity, Model, Pair, PointForce, Support, Traction, build_model
+from fem.model import Body, Clamp, Gravity, Model, Pair, PointForce, Pressure, Support, Traction, build_model
 from fem.modes import ModalBasis, Rayleigh, damping_ratios, rayleigh
 from fem.modes import solve_modes as tangent_modes
 from fem.preload import StaticSettings, StaticState, solve_static
@@ -64,6 +64,8 @@ def _load(table: LoadSettings) -> Load:
     surface = table.surface or ""
     if table.total_force is not None:
         return Clamp(table.name, surface, table.total_force)
+    if table.pressure is not None:
+        return Pressure(table.name, surface, table.pressure)
     if table.traction is not None:
         return Traction(table.name, surface, table.traction)
     if table.acceleration is not None:

@@ -105,12 +105,13 @@ class LoadSettings(Settings):
     point: tuple[Length, Length, Length] | None = None
     total_force: Force | None = None
     force: tuple[Force, Force, Force] | None = None
+    pressure: Pressure | None = None
     traction: tuple[Pressure, Pressure, Pressure] | None = None
     acceleration: tuple[float, float, float] | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        kinds = ("total_force", "force", "traction", "acceleration")
+        kinds = ("total_force", "pressure", "force", "traction", "acceleration")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
         if len(given) != 1:
             raise ValueError(f"needs one of {', '.join(kinds)}; got {', '.join(given) or 'none'}")

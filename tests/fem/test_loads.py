@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fem.errors import FemInputError
-from fem.loads import Force, Gravity, Load, PointForce, Traction
+from fem.loads import Force, Gravity, Load, PointForce, Pressure, Traction
 from fem.mesh import within
 from fem.model import Body, Clamp, build_model
 from tests.fem.small_models import STEEL, box
@@ -35,6 +35,7 @@ def _nodal(load: Load, element: str = "hex20") -> tuple[np.ndarray, np.ndarray]:
         (PointForce("p", (0.11, 0.07, 0.02), (5.0, -7.0, 2.0)), (5.0, -7.0, 2.0), (0.11, 0.07, 0.02)),
         (Gravity("g", (0.0, -9.81, 0.0)), (0.0, -9.81 * 7800.0 * 0.006, 0.0), (0.15, 0.1, 0.05)),
         (Clamp("c", "beam.x_max", 40.0), (-40.0, 0.0, 0.0), (0.3, 0.1, 0.05)),
+        (Pressure("p", "beam.x_max", 2e3), (-40.0, 0.0, 0.0), (0.3, 0.1, 0.05)),
     ],
 )
 def test_load_has_its_resultant_and_centre(

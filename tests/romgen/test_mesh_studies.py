@@ -144,9 +144,10 @@ def test_loads_of_every_kind(tmp_path: Path, tables: dict[str, Any]) -> None:
         {"name": "b", "surface": "strip.end", "traction": ["1 MPa", 0.0, 0.0]},
         {"name": "c", "point": [0.05, 0.002, 0.01], "force": [0.0, 0.0, 3.0]},
         {"name": "d", "surface": "strip.low", "total_force": 4.0},
+        {"name": "e", "surface": "strip.low", "pressure": "1 kPa"},
     ]
-    sums = fe_stages.build(_study(tmp_path, tables)).loads.reshape(4, -1, 3).sum(axis=1)
-    np.testing.assert_allclose(sums, [[2, 0, 0], [80, 0, 0], [0, 0, 3], [0, 4, 0]], atol=1e-9)
+    sums = fe_stages.build(_study(tmp_path, tables)).loads.reshape(5, -1, 3).sum(axis=1)
+    np.testing.assert_allclose(sums, [[2, 0, 0], [80, 0, 0], [0, 0, 3], [0, 4, 0], [0, 2, 0]], atol=1e-9)
 
 
 def test_unknown_names_stop_a_run_in_one_line(tmp_path: Path, tables: dict[str, Any]) -> None:

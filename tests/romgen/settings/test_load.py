@@ -89,7 +89,10 @@ MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_set("constraints", 0, "directions", to=["w"]), "Input should be 'x', 'y', 'z' or 'normal'; got 'w'"),
     (_set("loads", 0, "surface", to="bar.y_mx"), "[loads[0]] surface: unknown surface 'bar.y_mx'"),
     (_set("loads", 0, "surface", to="bar.y_max&z_mn"), "[loads[0]] surface: unknown surface 'bar.z_mn'; did you mean"),
-    (_set("loads", 0, "force", to=[1.0, 0.0, 0.0]), "needs one of total_force, force, traction, acceleration; got"),
+    (
+        _set("loads", 0, "force", to=[1.0, 0.0, 0.0]),
+        "needs one of total_force, pressure, force, traction, acceleration",
+    ),
     (_set("loads", 0, to={"name": "g", "acceleration": [0, 0, -9.81], "surface": "bar.y_max"}), "goes with no place"),
     (_set("loads", 0, to={"name": "f", "force": [0, 0, 1.0]}), "force goes with surface or point; got none"),
     (_set("constraints", 0, "displacement", to=[1e-3, 0.0]), "displacement needs one value for each of"),
