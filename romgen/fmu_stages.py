@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,8 +12,10 @@ from romgen.arrays import FloatArray
 from romgen.fmu.check import check_fmu
 from romgen.fmu.driver import replay
 from romgen.fmu.export import export_fmu
+from romgen.fmu.export3 import export_fmi3
+from romgen.fmu.levels import validate_unit
 from romgen.fmu.python_export import export_pythonfmu
-from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo
+from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo, FmuLevels
 from romgen.learning_stages import learned, learned_model
 from romgen.metrics import nmte_percent
 from romgen.settings import Study
@@ -24,10 +27,11 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Exported:
-    """The exported units; ``pythonfmu`` is None where the study does not ask for it."""
+    """The exported units; ``pythonfmu`` and ``fmi3`` are None where the study does not ask for them."""
 
     native: FmuExport
     pythonfmu: FmuExport | None
+    fmi3: FmuExport | None
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ class Validation:
 
     check: FmuCheck
     replays: tuple[Replay, ...]
+    levels: FmuLevels
 
 
 def fmu_stages(study: Study) -> tuple[Stage, ...]:
@@ -63,40 +68,74 @@ def fmu_stages(study: Study) -> tuple[Stage, ...]:
 
 
 def _unit_names(study: Study) -> tuple[str, ...]:
-    return (f"{study.name}.fmu", f"{study.name}_pythonfmu.fmu")[: 2 if study.fmu.pythonfmu else 1]
+    wanted = ((True, ""), (study.fmu.pythonfmu, "_pythonfmu"), (study.fmu.fmi3, "_fmi3"))
+    return tuple(f"{study.name}{suffix}.fmu" for asked, suffix in wanted if asked)
+
+
+def _path(context: Context, suffix: str) -> Path:
+    return context.run_dir / f"{context.study.name}{suffix}.fmu"
 
 
 def export(context: Context) -> Exported:
     """Write the native unit and, if asked for, the pythonfmu one."""
     study, model = context.study, learned_model(context)
-    paths = [context.run_dir / name for name in _unit_names(study)]
     errors = tuple((e.name, e.nmte_percent) for e in learned(context).validation)
-    info = FmuInfo(origin=(f"study {study.name}", f"inputs sha256 {context.key}"), errors_percent=errors)
-    native = export_fmu(model, paths[0], study.fmu, info=info, report=context.report)
+    info = FmuInfo(
+        origin=(f"study {study.name}", f"inputs sha256 {context.key}"),
+        errors_percent=errors,
+        base_share=_base_share(study),
+    )
+    native = export_fmu(model, _path(context, ""), study.fmu, info=info, report=context.report)
     for note in native.notes:
         log.warning("%s", note)
-    if not study.fmu.pythonfmu:
-        return Exported(native, None)
-    return Exported(native, export_pythonfmu(model, paths[1], study.fmu, info=info))
+    python = (
+        export_pythonfmu(model, _path(context, "_pythonfmu"), study.fmu, info=info) if study.fmu.pythonfmu else None
+    )
+    array_unit = export_fmi3(model, _path(context, "_fmi3"), study.fmu, info=info) if study.fmu.fmi3 else None
+    return Exported(native, python, array_unit)
+
+
+def _base_share(study: Study) -> tuple[float, ...]:
+    """1 for each sensor along the motion of the base, 0 for one across it; () where no base moves."""
+    base = study.base_acceleration
+    if base is None:
+        return ()
+    return tuple(float(sensor.direction == base.direction) for sensor in study.sensors.values())
 
 
 def validate(context: Context) -> Validation:
     """Check the units with fmpy against the Python model, and replay the held-out motions."""
-    paths: list[Path] = [context.run_dir / name for name in _unit_names(context.study)]
+    if context.study.fmu.start == "state":
+        return _validate(context, _path(context, ""))
+    # Motions are replayed from states; a unit that starts from sensors is checked through a twin without that.
+    with tempfile.TemporaryDirectory(prefix="romgen_twin_") as folder:
+        twin = Path(folder) / "twin.fmu"
+        settings = context.study.fmu.model_copy(update={"start": "state", "platforms": ("host",)})
+        export_fmu(learned_model(context), twin, settings, info=FmuInfo(base_share=_base_share(context.study)))
+        return _validate(context, twin)
+
+
+def _validate(context: Context, unit: Path) -> Validation:
     record = learned(context)
     # The free run starts where a training motion starts: any mixture of trained amplitudes may lie outside the data.
     starts = [item.start for item in record.training if math.isfinite(item.nmte_percent)]
     check = check_fmu(
-        paths[0],
+        unit,
         record.model,
         context.study.fmu,
-        pythonfmu=paths[1] if len(paths) > 1 else None,
+        pythonfmu=_path(context, "_pythonfmu") if context.study.fmu.pythonfmu else None,
         z0=starts[0] if starts else None,
     )
     context.report(0.5, "replay")
     # a motion on which the model itself diverges has nothing to replay
     motions = [item for item in learned(context).validation if math.isfinite(item.nmte_percent)]
-    return Validation(check, tuple(_replay(context, item, paths[0]) for item in motions))
+    replays = tuple(_replay(context, item, unit) for item in motions)
+    context.report(0.8, "levels L0 to L3")
+    levels = validate_unit(unit)
+    for row in levels.rows:
+        if not row.passed:
+            log.warning("FMU, %s: %s: %.3g, limit %g +- %g", row.level, row.check, row.value, row.target, row.limit)
+    return Validation(check, replays, levels)
 
 
 def _replay(context: Context, motion: TrajectoryError, unit: Path) -> Replay:

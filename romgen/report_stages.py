@@ -75,6 +75,8 @@ def report_inputs(context: Context) -> ReportInputs:
         fmu_export=None if exported is None else exported.native,
         pythonfmu_export=None if exported is None else exported.pythonfmu,
         fmu_check=None if validation is None else validation.check,
+        fmu_levels=None if validation is None else validation.levels,
+        fmi3_export=None if exported is None else exported.fmi3,
         fmu_replays={} if validation is None else {item.name: item.nmte_percent for item in validation.replays},
         stages=tuple(StageCost(name, info.wall_s, info.peak_memory_bytes) for name, info in infos.items()),
         warnings=(*study_warnings(study), *(f"{name}: {line}" for name, i in infos.items() for line in i.messages)),

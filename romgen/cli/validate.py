@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,7 @@ from romgen.cli.options import Force, Json, Quiet, RunDir, open_study, run_folde
 from romgen.cli.output import Output
 from romgen.cli.run import bring_up_to_date, read_summary
 from romgen.errors import AcceptanceError, InputError
-from romgen.fmu.driver import fmpy_problems
+from romgen.fmu.levels import validate_unit
 
 
 @reported
@@ -44,10 +45,17 @@ def validate(
 def _validate_unit(path: Path, out: Output) -> None:
     if not path.is_file():
         raise InputError("no such file", where=str(path))
-    problems = fmpy_problems(path)
-    for problem in problems:
+    levels = validate_unit(path)
+    for problem in levels.problems:
         out.text(problem)
-    out.text(f"{path.name}: fmpy reports {len(problems) or 'no'} problem{'s' if len(problems) > 1 else ''}")
-    out.document({"path": str(path), "fmpy_problems": problems})
-    if problems:
-        raise failure([f"{path}: fmpy reports {len(problems)} problems"], AcceptanceError.exit_code)
+    rows = [
+        (r.level, r.check, f"{r.value:.3g}", f"{r.target:g} +- {r.limit:g}", "ok" if r.passed else "MISSED")
+        for r in levels.rows
+    ]
+    out.table(("level", "check", "value", "limit", ""), rows)
+    for note in levels.notes:
+        out.text(note)
+    out.document({"path": str(path), "problems": levels.problems, "rows": [asdict(r) for r in levels.rows]})
+    missed = [r.check for r in levels.rows if not r.passed]
+    if missed:
+        raise failure([f"{path}: missed: {'; '.join(missed)}"], AcceptanceError.exit_code)

@@ -28,10 +28,12 @@ class References:
     """Value references of what a replay sets and reads."""
 
     states: tuple[int, ...]
+    rates: tuple[int, ...]
     inputs: tuple[int, ...]
     displacement: tuple[int, ...]
     velocity: tuple[int, ...]
     trust_ratio: int
+    max_internal_step: int
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,16 @@ def fmpy_problems(path: Path | str) -> tuple[str, ...]:
 
 
 @contextmanager
+def unpacked(path: Path | str) -> Iterator[str]:
+    """The archive as a temporary folder."""
+    folder = extract(str(path))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
 def opened_slave(path: Path | str) -> Iterator[Slave]:
     """An instance for Co-Simulation, freed on leaving; its messages are kept instead of printed.
 
@@ -56,11 +68,10 @@ def opened_slave(path: Path | str) -> Iterator[Slave]:
     ------
     InputError : when the unit has no binary for this machine or cannot be instantiated.
     """
-    folder = extract(str(path))
-    try:
+    with unpacked(path) as folder:
         description = read_model_description(folder, validate=False)
         messages: list[str] = []
-        callbacks = _collecting_callbacks(messages)
+        callbacks = collecting_callbacks(messages)
         try:
             fmu = FMU2Slave(
                 guid=description.guid,
@@ -73,11 +84,9 @@ def opened_slave(path: Path | str) -> Iterator[Slave]:
             detail = "; ".join([str(error), *messages])
             raise InputError("the unit cannot be instantiated", where=str(path), value=detail) from error
         try:
-            yield Slave(fmu, _references(description.modelVariables), messages)
+            yield Slave(fmu, references(description.modelVariables), messages)
         finally:
             fmu.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def replay(
@@ -134,7 +143,9 @@ def _replay(slave: Slave, t: FloatArray, z0: ComplexArray, inputs: FloatArray | 
     return FmuReplay(t, state, displacement, velocity, trust[:, 0])
 
 
-def _collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
+def collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
+    """Callbacks that append each message to a list instead of printing it."""
+
     def log(environment: int, instance: bytes, status: int, category: bytes, message: bytes) -> None:
         messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
 
@@ -145,7 +156,7 @@ def _collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
     return callbacks
 
 
-def _references(variables: list[Any]) -> References:
+def references(variables: list[Any]) -> References:
     """References by role: states are what a derivative points to, sensors are relative outputs in m and m/s."""
 
     def outputs(unit: str) -> tuple[int, ...]:
@@ -157,8 +168,10 @@ def _references(variables: list[Any]) -> References:
     base = {name for name, _ in BASE_MOTION}
     return References(
         states=tuple(v.derivative.valueReference for v in reals if v.derivative is not None),
+        rates=tuple(v.valueReference for v in reals if v.derivative is not None),
         inputs=tuple(v.valueReference for v in reals if v.causality == "input" and v.name not in base),
         displacement=outputs("m"),
         velocity=outputs("m/s"),
         trust_ratio=next(v.valueReference for v in reals if v.name == "trust_ratio"),
+        max_internal_step=next(v.valueReference for v in reals if v.name == "max_internal_step"),
     )

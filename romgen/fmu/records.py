@@ -101,6 +101,50 @@ class FmuReplay:
 
 
 @dataclass(frozen=True)
+class LevelRow:
+    """One check of a validation level; it is passed where abs(value - target) <= limit.
+
+    Attributes
+    ----------
+    level : "L0" structure and binary, "L1" kernel and trajectory, "L2" state and use, "L3" importers and inputs.
+    check : what was compared with what.
+    value, target, limit : the figure, what it should be, and how far it may be off.
+    """
+
+    level: str
+    check: str
+    value: float
+    target: float
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the limit holds; a figure that is not a number does not pass."""
+        return abs(self.value - self.target) <= self.limit
+
+
+@dataclass(frozen=True)
+class FmuLevels:
+    """All checks of one unit, and what could not be checked here.
+
+    Attributes
+    ----------
+    rows : in the order of the levels.
+    problems : the sentences behind the counts of L0.
+    notes : what was left out and why.
+    """
+
+    rows: tuple[LevelRow, ...]
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every row passed."""
+        return all(row.passed for row in self.rows)
+
+
+@dataclass(frozen=True)
 class FmuCheck:
     """How far exported units are from the standard and from the Python model under the same input.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.fmu.records import FmuCheck, FmuExport, FmuLevels
 from romgen.report.blocks import ListingBlock, TableBlock
 
 
 def export_table(kind: str, export: FmuExport) -> TableBlock:
-    """What was written; ``kind`` is native or pythonfmu."""
+    """What was written; ``kind`` says which unit, and for which version of FMI."""
     rows = (
         ("file", export.path),
         ("size", f"{export.size_bytes:,} bytes"),
@@ -19,7 +19,7 @@ def export_table(kind: str, export: FmuExport) -> TableBlock:
         ("sha256", export.sha256),
         *(("note", note) for note in export.notes),
     )
-    return TableBlock(f"The exported {kind} unit, FMI 2.0.", ("what", "value"), rows, True)
+    return TableBlock(f"The exported {kind}.", ("what", "value"), rows, True)
 
 
 def check_table(check: FmuCheck, limit: float) -> TableBlock:
@@ -39,6 +39,18 @@ def check_table(check: FmuCheck, limit: float) -> TableBlock:
         f"largest magnitude of states, displacements and velocities over {check.n_step} steps of {check.step_size:g} s."
     )
     return TableBlock(caption, ("run", "input", "difference [1]", "limit [1]", "verdict"), tuple(rows), True)
+
+
+def levels_table(levels: FmuLevels) -> TableBlock:
+    """The validation levels of the native unit, each check against its limit."""
+    rows = tuple(
+        (r.level, r.check, f"{r.value:.3g}", f"{r.target:g} ± {r.limit:g}", "met" if r.passed else "not met")
+        for r in levels.rows
+    )
+    caption = "Validation levels of the native unit, as romgen validate prints them. " + " ".join(
+        f"{note}." for note in levels.notes
+    )
+    return TableBlock(caption, ("level", "check", "value", "limit", "verdict"), rows, True)
 
 
 def replay_table(replays: Mapping[str, float]) -> TableBlock:

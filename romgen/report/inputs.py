@@ -10,7 +10,7 @@ import numpy as np
 
 from romgen.arrays import FloatArray
 from romgen.backbone import Backbone
-from romgen.fmu.records import FmuCheck, FmuExport
+from romgen.fmu.records import FmuCheck, FmuExport, FmuLevels
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_validation import ForcedPoint
 from romgen.lifted_orbit import Measure
@@ -85,6 +85,7 @@ class ReportInputs:
     backbones : free vibration of the reduced model, one per mode and kind.
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
     fmu_export, pythonfmu_export, fmu_check : the exported units and how well they repeat the Python model.
+    fmu_levels : validation levels L0 to L3 of the native unit; fmi3_export : the FMI 3.0 unit.
     fmu_replays : held-out trajectory -> NMTE in percent of its sensors rebuilt by the native unit.
     stages : cost of each stage, in running order.
     warnings : one line per thing a reader must know.
@@ -114,6 +115,8 @@ class ReportInputs:
     fmu_export: FmuExport | None = None
     pythonfmu_export: FmuExport | None = None
     fmu_check: FmuCheck | None = None
+    fmu_levels: FmuLevels | None = None
+    fmi3_export: FmuExport | None = None
     fmu_replays: Mapping[str, float] = field(default_factory=dict)
     stages: tuple[StageCost, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -12,7 +12,7 @@ from romgen.report.backbone_figures import backbone_figure, backbone_name
 from romgen.report.blocks import Block, ListingBlock, Section, TableBlock, TextBlock
 from romgen.report.contact_figures import contact_figure, convergence_figure, resultant_table
 from romgen.report.cost_figures import cost_figure, cost_table
-from romgen.report.fmu_tables import check_table, export_table, problem_listing, replay_table
+from romgen.report.fmu_tables import check_table, export_table, levels_table, problem_listing, replay_table
 from romgen.report.forced_figures import modal_figure, response_figure, response_table
 from romgen.report.forced_points import forced_points_figure, forced_points_table
 from romgen.report.inputs import ReportInputs
@@ -146,13 +146,18 @@ def backbone_section(inputs: ReportInputs) -> Section | None:
 def fmu_section(inputs: ReportInputs) -> Section | None:
     """The exported unit and its checks."""
     check = inputs.fmu_check
-    exports = (("native", inputs.fmu_export), ("pythonfmu", inputs.pythonfmu_export))
+    exports = (
+        ("native unit, FMI 2.0", inputs.fmu_export),
+        ("pythonfmu unit, FMI 2.0", inputs.pythonfmu_export),
+        ("unit with arrays, FMI 3.0", inputs.fmi3_export),
+    )
     exported = tuple(export_table(kind, export) for kind, export in exports if export is not None)
     replayed: tuple[Block, ...] = (replay_table(inputs.fmu_replays),) if inputs.fmu_replays else ()
     checked: tuple[Block, ...] = ()
     if check is not None:
         checked = (check_table(check, inputs.limits.fmu_relative), problem_listing(check))
-    blocks = (*exported, *checked, *replayed)
+    levels = () if inputs.fmu_levels is None else (levels_table(inputs.fmu_levels),)
+    blocks = (*exported, *checked, *levels, *replayed)
     return Section("fmu", "Exported FMU", blocks) if blocks else None
 
 

@@ -1,0 +1,153 @@
+"""The validation levels L0 to L3 of a unit from its file alone."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import read_model_description, simulate_fmu
+
+from romgen.arrays import FloatArray
+from romgen.fmu.binary_checks import binary_rows
+from romgen.fmu.check import random_input, replay_difference
+from romgen.fmu.compilers import host_platform
+from romgen.fmu.driver import Hold, fmpy_problems, replay, unpacked
+from romgen.fmu.kernel_checks import START, kernel_rows
+from romgen.fmu.model_exchange import replay_model_exchange
+from romgen.fmu.model_file import model_from_json
+from romgen.fmu.records import FmuLevels, LevelRow
+from romgen.fmu.rules import rule_problems
+from romgen.fmu.sensor_variables import BASE_MOTION
+from romgen.fmu.state_checks import state_rows
+from romgen.progress import Report
+from romgen.reduced_model import ReducedModel
+from romgen.simulate import simulate_reference
+
+NOT_HERE = "valgrind, sanitizers and random call sequences run in the tests of romgen, not in this table"
+
+
+def _silent(fraction: float, text: str) -> None:
+    """Report nothing."""
+
+
+def validate_unit(path: Path, report: Report = _silent) -> FmuLevels:
+    """Check a unit from its file alone: structure for any FMI 2.0 unit, all levels for one that romgen exported.
+
+    The Python model is read from resources/rom.json in the unit. Levels are L0 structure and binary, L1 equations and
+    integrator, L2 states and use, L3 importers and treatment of inputs.
+
+    Parameters
+    ----------
+    path : the unit.
+    report : told the finished fraction and the level in work.
+
+    Raises
+    ------
+    InputError : the file is no FMI 2.0 unit, or its model cannot be read.
+    """
+    report(0.0, "L0")
+    problems, broken = fmpy_problems(path), rule_problems(path)
+    rows = [
+        LevelRow("L0", "problems that fmpy's validator reports", len(problems), 0.0, 0.0),
+        LevelRow("L0", "rules of FMI 2.0 that are broken", len(broken), 0.0, 0.0),
+    ]
+    found, notes = (*problems, *broken), [NOT_HERE]
+    model = _model_inside(path)
+    with unpacked(path) as folder:
+        has_binary = (Path(folder) / "binaries" / host_platform()).is_dir()
+        if model is not None and has_binary and _is_native(path):
+            rows += binary_rows(Path(folder))
+            rows += _measured(path, model, report)
+        else:
+            notes.insert(
+                0, "L1 to L3 need a native unit of romgen that starts from states, with a binary for this machine"
+            )
+    report(1.0, "checked")
+    return FmuLevels(tuple(rows), found, tuple(notes))
+
+
+def _measured(path: Path, model: ReducedModel, report: Report) -> Iterator[LevelRow]:
+    step = float(read_model_description(str(path), validate=False).defaultExperiment.stepSize)
+    report(0.1, "L1")
+    yield from kernel_rows(path, model, step)
+    report(0.5, "L2")
+    yield from state_rows(path, model, step)
+    report(0.8, "L3")
+    yield from _input_rows(path, model, step)
+
+
+def _model_inside(path: Path) -> ReducedModel | None:
+    with zipfile.ZipFile(path) as archive:
+        if "resources/rom.json" not in archive.namelist():
+            return None
+        return model_from_json(archive.read("resources/rom.json").decode())
+
+
+def _is_native(path: Path) -> bool:
+    """Both interfaces, and start values of the states."""
+    description = read_model_description(str(path), validate=False)
+    states = [v.derivative for v in description.modelVariables if v.derivative is not None]
+    both = description.coSimulation is not None and description.modelExchange is not None
+    return both and all(state.initial == "exact" for state in states)
+
+
+def _input_rows(path: Path, model: ReducedModel, step: float) -> Iterator[LevelRow]:
+    """fmpy's own Co-Simulation, Model Exchange with inputs at every stage, orders of the input treatment."""
+    z0 = START * model.trained_amplitude.astype(np.complex128)
+    t: FloatArray = step * np.arange(101, dtype=np.float64)
+    if not model.inputs:
+        return
+    u = random_input(model, t)
+    signals = np.array(
+        [tuple(row) for row in np.column_stack([t, u])], dtype=[(n, float) for n in ("time", *_inputs(path))]
+    )
+    run = replay(path, t, np.zeros_like(z0), u)
+    states = [v.derivative.name for v in _variables(path) if v.derivative is not None]
+    simulated = simulate_fmu(
+        str(path), validate=False, fmi_type="CoSimulation", stop_time=float(t[-1]), output_interval=step,
+        input=signals, start_values={"warn_on_crossing": False}, logger=lambda *_: None, output=states,
+    )  # fmt: skip
+    rows = simulated.view(np.float64).reshape(len(simulated), -1)[: len(t), 1:]
+    apart = float(np.max(np.abs(rows - run.state[: len(rows)])) / np.max(np.abs(run.state)))
+    yield LevelRow("L3", "fmpy's simulate_fmu against the step-by-step driver, held input", apart, 0.0, 1e-9)
+    ramp = u[1] / t[-1]
+    exchanged = replay_model_exchange(path, t[::10], z0, lambda time: ramp * time)
+    z = simulate_reference(model, t[::10], z0, t[::10, None] * ramp, rtol=1e-12)
+    yield LevelRow(
+        "L3", "Model Exchange by DOP853, inputs at every stage", replay_difference(exchanged, model, z), 0.0, 1e-9
+    )
+    orders: tuple[tuple[Hold, float], ...] = (("constant", 1.0), ("linear", 2.0))
+    for hold, order in orders:
+        yield LevelRow("L3", f"order of the input error, {hold}", _input_order(path, model, hold), order, 0.1)
+
+
+def _variables(path: Path) -> list[Any]:
+    return list(read_model_description(str(path), validate=False).modelVariables)
+
+
+def _inputs(path: Path) -> list[str]:
+    base = {name for name, _ in BASE_MOTION}
+    return [v.name for v in _variables(path) if v.causality == "input" and v.name not in base]
+
+
+def _input_order(path: Path, model: ReducedModel, hold: Hold) -> float:
+    """Slope of the end error of a smooth input over three communication steps against one 16 times finer."""
+    slowest = float(np.min(np.abs(model.eigenvalues)))
+    fastest = float(np.max(np.abs(model.eigenvalues)))
+    end = 8.0 / slowest
+    coarse = int(np.ceil(end * fastest / 0.1))
+
+    def motion(n: int, treatment: Hold) -> FloatArray:
+        t: FloatArray = np.linspace(0.0, end, n + 1)
+        peak = np.max(np.abs(random_input(model, np.linspace(0.0, end, 65))), axis=0)
+        u = np.sin(0.7 * slowest * t + 0.4)[:, None] * peak
+        last: FloatArray = replay(path, t, np.zeros(len(model.eigenvalues), dtype=complex), u, hold=treatment).state[-1]
+        return last
+
+    counts = coarse * np.array([1, 2, 4])
+    exact = motion(int(counts[-1]) * 16, "linear")
+    errors = [np.max(np.abs(motion(int(n), hold) - exact)) for n in counts]
+    return float(-np.polyfit(np.log(counts), np.log(errors), 1)[0])

@@ -1,0 +1,89 @@
+"""The validation levels pass for exported units, and miss what is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from romgen.errors import InputError
+from romgen.fmu.archive import write_archive
+from romgen.fmu.export import export_fmu
+from romgen.fmu.levels import validate_unit
+from romgen.fmu.model_file import model_from_json, model_json
+from romgen.fmu.records import FmuExport, FmuInfo, LevelRow
+from romgen.polynomial import evaluate, zeta
+from romgen.reduced_model import ReducedModel
+from romgen.settings import FmuSettings
+from tests.romgen.fmu.models import duffing_chain, random_model, random_states
+
+
+@pytest.mark.parametrize("make", [lambda: random_model(5, 2), lambda: random_model(3, 0), lambda: duffing_chain(3)])
+def test_exported_units_pass_every_level(make, tmp_path: Path) -> None:
+    export = export_fmu(make(), tmp_path / "x.fmu", FmuSettings())
+    levels = validate_unit(Path(export.path))
+    host = {"newest GNU C library asked for, 2.04 for version 2.4"} if export.compiler != "zig" else set()
+    assert [r.check for r in levels.rows if not r.passed and r.check not in host] == []
+    assert {r.level for r in levels.rows} >= {"L0", "L1", "L2"}
+
+
+def test_absolute_outputs_do_not_disturb_the_levels(model: ReducedModel, tmp_path: Path) -> None:
+    export_fmu(model, tmp_path / "x.fmu", FmuSettings(absolute=True), info=FmuInfo(base_share=(1.0, 1.0, 0.0)))
+    rows = validate_unit(tmp_path / "x.fmu").rows
+    assert [r.check for r in rows if not r.passed and "GNU" not in r.check] == []
+    assert "L3" in {r.level for r in rows}
+
+
+def changed_unit(native: FmuExport, path: Path, name: str, content: bytes) -> Path:
+    """The unit with one file of its archive exchanged."""
+    with zipfile.ZipFile(native.path) as archive:
+        files = {entry: archive.read(entry) for entry in archive.namelist()}
+    write_archive(path, {**files, name: content})
+    return path
+
+
+def test_a_library_of_another_model_is_found_out(native: FmuExport, model: ReducedModel, tmp_path: Path) -> None:
+    """rom.json with one coefficient off by 1e-9: kernel and trajectories miss, states and instances do not."""
+    coefficients = model.displacement.coefficients * (1.0 + 1e-9)
+    other = dataclasses.replace(model, displacement=dataclasses.replace(model.displacement, coefficients=coefficients))
+    unit = changed_unit(native, tmp_path / "x.fmu", "resources/rom.json", model_json(other).encode())
+    missed = {r.level for r in validate_unit(unit).rows if not r.passed and "GNU" not in r.check}
+    assert "L1" in missed
+    assert "L2" not in missed
+
+
+def test_broken_rules_are_counted_and_named(native: FmuExport, tmp_path: Path) -> None:
+    with zipfile.ZipFile(native.path) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    broken = text.replace('name="logAll"', 'name="logStatusError"')
+    levels = validate_unit(changed_unit(native, tmp_path / "x.fmu", "modelDescription.xml", broken.encode()))
+    assert not levels.passed
+    assert any("logStatusError" in problem for problem in levels.problems)
+
+
+def test_what_cannot_be_checked_is_said(pythonfmu_unit: FmuExport, model: ReducedModel, tmp_path: Path) -> None:
+    source_only = export_fmu(model, tmp_path / "x.fmu", FmuSettings(platforms=()))
+    for path in (pythonfmu_unit.path, source_only.path):
+        levels = validate_unit(Path(path))
+        assert {r.level for r in levels.rows} == {"L0"}
+        assert "L1 to L3 need" in levels.notes[0]
+
+
+def test_a_figure_that_is_not_a_number_does_not_pass() -> None:
+    assert not LevelRow("L1", "x", float("nan"), 0.0, 1.0).passed
+
+
+def test_rom_json_gives_the_model_back(model: ReducedModel) -> None:
+    again = model_from_json(model_json(model))
+    np.testing.assert_array_equal(again.eigenvalues, model.eigenvalues)
+    np.testing.assert_array_equal(again.normal_form.coefficients, model.normal_form.coefficients)
+    np.testing.assert_array_equal(again.velocity.coefficients, model.velocity.coefficients)
+    assert (again.sensors, again.inputs) == (model.sensors, model.inputs)
+    z = zeta(random_states(model, 20))
+    expected = evaluate(model.chart, z).real
+    np.testing.assert_allclose(evaluate(again.chart, z).real, expected, atol=1e-14 * np.abs(expected).max())
+    with pytest.raises(InputError, match="not a reduced model"):
+        model_from_json('{"format": "other"}')
