@@ -6,7 +6,10 @@ The names below are what a case needs; docs/finite_elements.md sets one up.
 from fem.arc_length import EquilibriumPath, PathSettings, follow_path
 from fem.block import graded, hex_block
 from fem.bolt import Bolt
+from fem.campaign import Observation, Starts, march_campaign, modal_coordinates, modal_starts, snap_back_starts
+from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.errors import FemConvergenceError, FemError, FemInputError
+from fem.excitation import TimeLoad, base_load, time_load
 from fem.interfaces import Pair, Tie
 from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
 from fem.material import Material
@@ -14,19 +17,23 @@ from fem.merge import merged
 from fem.mesh import Mesh, within
 from fem.modal_quantities import effective_masses, mac, near_integer_ratios, participation_factors, total_masses
 from fem.model import Body, Model, build_model
-from fem.modes import ModalBasis, rayleigh, rest_state, solve_modes
+from fem.modes import ModalBasis, Rayleigh, no_modes, rayleigh, rest_state, solve_modes
+from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, StaticState, solve_static
 from fem.reaction import reaction
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
 from fem.stress import integration_point_stress, nodal_stress
 from fem.supports import Support
+from fem.transient import Transient, TransientSettings
 
 __all__ = [
     "Body",
     "Bolt",
     "Clamp",
     "EquilibriumPath",
+    "ExplicitSettings",
+    "ExplicitTransient",
     "FemConvergenceError",
     "FemError",
     "FemInputError",
@@ -36,16 +43,25 @@ __all__ = [
     "Mesh",
     "ModalBasis",
     "Model",
+    "MotionState",
+    "Observation",
     "Pair",
     "PathSettings",
     "PointForce",
     "Pressure",
+    "Rayleigh",
     "Sensor",
+    "Starts",
     "StaticSettings",
     "StaticState",
+    "StepRecord",
     "Support",
     "Tie",
+    "TimeLoad",
     "Traction",
+    "Transient",
+    "TransientSettings",
+    "base_load",
     "build_model",
     "effective_masses",
     "follow_path",
@@ -53,8 +69,12 @@ __all__ = [
     "hex_block",
     "integration_point_stress",
     "mac",
+    "march_campaign",
     "merged",
+    "modal_coordinates",
+    "modal_starts",
     "near_integer_ratios",
+    "no_modes",
     "nodal_stress",
     "participation_factors",
     "rayleigh",
@@ -62,8 +82,10 @@ __all__ = [
     "read_mesh",
     "rest_state",
     "sensor_rows",
+    "snap_back_starts",
     "solve_modes",
     "solve_static",
+    "time_load",
     "total_masses",
     "within",
 ]

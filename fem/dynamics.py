@@ -18,13 +18,6 @@ from fem.preload import StaticState
 from fem.sparse_product import SparseProduct
 
 
-def undeformed(model: Model) -> StaticState:
-    """The unloaded model, from which free bodies may start: u = 0, nothing has slipped."""
-    u = np.zeros(model.n_dof)
-    contact = model.contact.evaluate(model.contact.relative(u[:, None]), model.contact.no_slip(1))
-    return StaticState(u, contact, (), ())
-
-
 class Dynamics:
     """M u'' + C u' + f_viscous(u, u') + f(u, slip) = p(t), with the operators that every scheme needs.
 

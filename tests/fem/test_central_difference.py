@@ -10,11 +10,10 @@ from fem.body import Body
 from fem.campaign import Observation, march_campaign, moving_starts
 from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.critical_step import critical_step
-from fem.dynamics import undeformed
 from fem.errors import FemConvergenceError, FemInputError
 from fem.material import Material
 from fem.model import Model, Pair, build_model
-from fem.modes import Rayleigh, no_modes
+from fem.modes import Rayleigh, no_modes, rest_state
 from fem.supports import Support
 from fem.transient import Transient, TransientSettings
 from tests.fem.small_models import box, single
@@ -43,14 +42,14 @@ def _push(model: Model) -> np.ndarray:
 
 def _explicit(model: Model, time_step: float = 1e-4, **options: float) -> ExplicitTransient:
     settings = ExplicitSettings(time_step, solver="superlu", **options)  # type: ignore[arg-type]
-    return ExplicitTransient(model, undeformed(model), DAMPING, settings)
+    return ExplicitTransient(model, rest_state(model), DAMPING, settings)
 
 
 def test_critical_step_is_that_of_the_stiffest_mode() -> None:
     """Against all eigenvalues of the dense pencil with closed contact; damping shortens the step as in one mode."""
     model = _stack()
     mass, free = model.lumped_mass(), model.free
-    rest = undeformed(model)
+    rest = rest_state(model)
     closed = model.contact.stick_tangent(np.ones(model.contact.n_point, dtype=np.int64))
     stiffness = (model.elastic_tangent(rest.u) + closed).toarray()[np.ix_(free, free)]
     root = 1.0 / np.sqrt(mass[free])
@@ -75,7 +74,7 @@ def _growth(omega: float, beta: float, h: float) -> float:
 def test_both_schemes_find_the_same_collision() -> None:
     """Blocks that collide, slide and part, with lumped mass in both: four times finer steps, half the gap."""
     model = _stack()
-    rest, velocity, gaps = undeformed(model), _push(model), []
+    rest, velocity, gaps = rest_state(model), _push(model), []
     zero = np.zeros_like(velocity)
     for parts, safety in ((5, 0.9), (20, 0.225)):
         explicit = _explicit(model, 2e-3, safety=safety)
@@ -96,8 +95,8 @@ def test_both_schemes_find_the_same_collision() -> None:
 
 def test_restart_repeats_the_explicit_campaign_bit_by_bit() -> None:
     model = _stack()
-    observation = Observation(no_modes(model, undeformed(model)), np.eye(model.n_dof)[:2], 2)
-    starts = moving_starts(undeformed(model), np.zeros((model.n_dof, 1)), _push(model))
+    observation = Observation(no_modes(model, rest_state(model)), np.eye(model.n_dof)[:2], 2)
+    starts = moving_starts(rest_state(model), np.zeros((model.n_dof, 1)), _push(model))
     whole = list(march_campaign(_explicit(model), observation, 12, 5, starts=starts))
     again = list(march_campaign(_explicit(model), observation, 12, 5, restart=whole[0].state))
     assert len(again) == 2

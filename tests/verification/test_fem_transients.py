@@ -13,12 +13,11 @@ from fem.block import graded, hex_block
 from fem.body import Body
 from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.contact import Contact
-from fem.dynamics import undeformed
 from fem.excitation import time_load
 from fem.loads import Gravity
 from fem.material import Material
 from fem.model import Model, Pair, build_model
-from fem.modes import Rayleigh, no_modes, solve_modes
+from fem.modes import Rayleigh, no_modes, rest_state, solve_modes
 from fem.motion import StepRecord
 from fem.preload import StaticSettings, solve_static
 from fem.supports import Support
@@ -50,7 +49,7 @@ def test_v20_one_sided_spring_has_the_frequency_four_thirds(amplitude: float) ->
     omega h = 8e-3 in the stiffer half: average acceleration errs by (omega h)^2/12 = 5e-6.
     """
     model, h = _one_sided_spring(), 4e-3
-    rest = undeformed(model)
+    rest = rest_state(model)
     settings = TransientSettings(h, 1.0, tolerance=1e-12, dispersion_correction=False, solver="superlu")
     transient = Transient(model, rest, no_modes(model, rest), NO_DAMPING, settings, force_scale=amplitude)
     start = np.array([[amplitude], [0.0], [0.0]])
@@ -94,7 +93,7 @@ def test_v21_bar_hits_a_rigid_wall(scheme: str) -> None:
     short waves: their force rings, so means over a tenth of the duration are compared.
     """
     model, duration = _impact(), 2.0 * LENGTH / WAVE
-    rest, h = undeformed(model), LENGTH / CELLS / WAVE / 2.0
+    rest, h = rest_state(model), LENGTH / CELLS / WAVE / 2.0
     transient: Transient | ExplicitTransient
     if scheme == "implicit":
         settings = TransientSettings(h, 0.8, tolerance=1e-8, dispersion_correction=False, solver="superlu")
