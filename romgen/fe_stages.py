@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -16,18 +18,35 @@ from fem.loads import Load
 from fem.material import Material
 from fem.mesh import Mesh, within
 from fem.modal_quantities import effective_masses, total_masses
-from fem.model import Body, Clamp, Gravity, Model, Pair, PointForce, Pressure, Support, Traction, build_model
+from fem.model import (
+    Body,
+    Bolt,
+    Clamp,
+    Gravity,
+    Model,
+    Pair,
+    PointForce,
+    Pressure,
+    Support,
+    Tie,
+    Traction,
+    build_model,
+)
 from fem.modes import ModalBasis, Rayleigh, damping_ratios, rayleigh
 from fem.modes import solve_modes as tangent_modes
-from fem.preload import StaticSettings, StaticState, solve_static
+from fem.preload import StaticSettings, StaticState, lock_bolts
+from fem.preload import solve_preload as tighten
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
+from fem.sliding import SlidingWarning
 from fem.stress import nodal_stress
 from romgen.arrays import IntArray
 from romgen.errors import InputError, NumericalError
 from romgen.progress import Report
 from romgen.settings import BlockSettings, LoadSettings, MeshSettings, Study, named_surfaces, unknown
 from romgen.structure import Interface, Modes, Preload, Structure
+
+log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -51,13 +70,12 @@ def build(study: Study) -> Model:
         values = study.materials[table.material]
         material = Material(values.young_modulus, values.poisson_ratio, values.density)
         bodies.append(Body(name, body_mesh(study, name), material, table.kinematics))
-    pairs = [
-        Pair(name, c.slave, c.master, c.friction, c.normal_penalty, c.tangential_penalty)
-        for name, c in study.contacts.items()
-    ]
+    pairs = [Pair(name, **contact.model_dump()) for name, contact in study.contacts.items()]
+    ties = [Tie(name, **tie.model_dump()) for name, tie in study.ties.items()]
+    bolts = [Bolt(name, **bolt.model_dump()) for name, bolt in study.bolts.items()]
     supports = [Support(c.surface, tuple(c.directions), c.displacement or 0.0) for c in study.constraints]
     loads = [_load(table) for table in study.loads]
-    return build_model(bodies, pairs=pairs, supports=supports, loads=loads)
+    return build_model(bodies, pairs=pairs, supports=supports, loads=loads, ties=ties, bolts=bolts)
 
 
 def _load(table: LoadSettings) -> Load:
@@ -109,7 +127,7 @@ def mesh_file_problems(study: Study) -> tuple[tuple[str, ...], int]:
                 meshes[name] = body_mesh(study, name)
             except FemError as error:
                 problems.append(f"[{'meshes' if name in study.meshes else 'regions of blocks'}.{name}] {error}")
-    contacts = [f"[contacts.{name}]" for name in study.contacts]
+    contacts = [f"[contacts.{name}]" for name in study.contacts] + [f"[ties.{name}]" for name in study.ties]
     for where, named in named_surfaces(study):
         body, _, parts = named.partition(".")
         if body not in meshes or body not in study.meshes:
@@ -157,7 +175,11 @@ def solve_preload(study: Study, report: Report) -> Preload:
     model = build(study)
     table = study.preload
     settings = StaticSettings(table.steps, table.tolerance, table.max_iterations)
-    state = solve_static(model, model.load, settings, progress=lambda f: report(f, f"load factor {f:.2f}"))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SlidingWarning)
+        model, state = tighten(model, settings, progress=lambda f: report(f, f"load factor {f:.2f}"))
+    for warning in caught:
+        log.warning("%s", warning.message)
     interfaces = tuple(
         Interface(
             name=s.name,
@@ -175,7 +197,14 @@ def solve_preload(study: Study, report: Report) -> Preload:
     )
     cauchy = nodal_stress(model, state.u).cauchy
     stress = cauchy[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
-    return Preload(state.u, interfaces, np.array(state.load_factors), np.array(state.residuals), stress)
+    return Preload(
+        state.u, interfaces, np.array(state.load_factors), np.array(state.residuals), stress, model.bolts.shortening
+    )
+
+
+def preloaded(study: Study, preload: Preload) -> Model:
+    """Build the model of a study with its bolts locked as the preload left them."""
+    return lock_bolts(build(study), preload.bolt_shortening)
 
 
 def equilibrium(model: Model, preload: Preload) -> StaticState:
@@ -193,7 +222,7 @@ def equilibrium(model: Model, preload: Preload) -> StaticState:
 @translated()
 def solve_modes(study: Study, preload: Preload) -> Modes:
     """Find the modes about the preloaded state, their damping, loads and sensors."""
-    model = build(study)
+    model = preloaded(study, preload)
     basis = tangent_modes(model, equilibrium(model, preload), study.modes.count)
     damping = _damping(study, basis)
     base = study.base_acceleration

@@ -22,7 +22,7 @@ from fem.transient import Transient, TransientSettings
 from romgen.arrays import FloatArray
 from romgen.differences import DROPPED, first_derivative, second_derivative
 from romgen.errors import InputError
-from romgen.fe_stages import build, equilibrium, translated
+from romgen.fe_stages import equilibrium, preloaded, translated
 from romgen.forced_motion import ForcedMotion
 from romgen.settings import RingDownSettings, Study
 from romgen.structure import EnergyLedger, Modes, Preload, RingDown, StepEffort
@@ -75,7 +75,7 @@ def _transient(
 ) -> tuple[Transient | ExplicitTransient, ModalBasis]:
     """The model of a study ready to march by the table [ringdowns], and its modes."""
     table = _ringdowns(study)
-    model = build(study)
+    model = preloaded(study, preload)
     state = equilibrium(model, preload)
     omega = 2.0 * np.pi * modes.frequency_hz
     tangents = (model.elastic_tangent(state.u), model.elastic_tangent(state.u, geometric=False))

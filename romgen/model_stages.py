@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Segment = TypeVar("Segment", bound="DataclassInstance")
 log = logging.getLogger(__name__)
 
-MODEL_TABLES = ("materials", "blocks", "meshes", "regions", "contacts", "constraints")
+MODEL_TABLES = ("materials", "blocks", "meshes", "regions", "contacts", "ties", "bolts", "constraints")
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,7 @@ def model_stages(study: Study) -> tuple[Stage, ...]:
     if study.data is not None:
         return (Stage("data", Recorded, (), ("data",), read_data),)
     return (
-        Stage(
-            "mesh", Structure, (), ("materials", "blocks", "meshes", "regions", "contacts", "constraints"), build_mesh
-        ),
+        Stage("mesh", Structure, (), MODEL_TABLES, build_mesh),
         Stage("preload", Preload, ("mesh",), ("loads", "preload"), solve_preload),
         Stage("modes", Modes, ("preload",), ("modes", "sensors", "base_acceleration"), solve_modes),
         Stage("ringdowns", RingDowns, ("modes",), ("ringdowns", "learn.master_modes"), march_ringdowns),

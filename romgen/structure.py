@@ -74,6 +74,7 @@ class Preload:
     load_factors : (n_step,) load factor of each converged step.
     residuals : (n_iteration,) relative residual of each Newton iteration of all steps.
     stress : (n_node, 6) Cauchy stress at the nodes, xx, yy, zz, xy, yz, xz; empty where it was not recovered.
+    bolt_shortening : (n_bolt,) m by which each bolt was tightened and is locked.
     """
 
     displacement: FloatArray = field(metadata={"unit": "m", "axes": "dof"})
@@ -83,6 +84,7 @@ class Preload:
     stress: FloatArray = field(
         default_factory=lambda: np.empty((0, 6)), metadata={"unit": "Pa", "axes": "node,component"}
     )
+    bolt_shortening: FloatArray = field(default_factory=lambda: np.empty(0), metadata={"unit": "m", "axes": "bolt"})
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from romgen.settings.finite_elements import (
     BaseAccelerationSettings,
     BlockSettings,
     ConstraintSettings,
-    ContactSettings,
     LoadSettings,
     MaterialSettings,
     ModesSettings,
@@ -18,6 +17,7 @@ from romgen.settings.finite_elements import (
     RingDownStart,
     SensorSettings,
 )
+from romgen.settings.joints import BoltSettings, ContactSettings, TieSettings
 from romgen.settings.learning import (
     AcceptanceSettings,
     FmuSettings,
@@ -35,6 +35,7 @@ __all__ = [
     "ArchSettings",
     "BaseAccelerationSettings",
     "BlockSettings",
+    "BoltSettings",
     "ConstraintSettings",
     "ContactSettings",
     "DataSettings",
@@ -57,6 +58,7 @@ __all__ = [
     "Study",
     "StudyError",
     "StudySettings",
+    "TieSettings",
     "estimate",
     "load_study",
     "named_surfaces",

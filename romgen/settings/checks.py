@@ -51,8 +51,10 @@ def surfaces(study: Study) -> tuple[str, ...]:
 
 def named_surfaces(study: Study) -> tuple[tuple[str, str], ...]:
     """Return where the study names a surface or a set of nodes, and the name, "<body>.<surface>"."""
-    named = [(f"[contacts.{name}] slave:", pair.slave) for name, pair in study.contacts.items()]
-    named += [(f"[contacts.{name}] master:", pair.master) for name, pair in study.contacts.items()]
+    joints = [(f"[contacts.{name}]", pair.slave, pair.master) for name, pair in study.contacts.items()]
+    joints += [(f"[ties.{name}]", tie.slave, tie.master) for name, tie in study.ties.items()]
+    named = [(f"{where} slave:", slave) for where, slave, _ in joints]
+    named += [(f"{where} master:", master) for where, _, master in joints]
     named += [(f"[constraints[{k}]] surface:", item.surface) for k, item in enumerate(study.constraints)]
     named += [(f"[loads[{k}]] surface:", item.surface) for k, item in enumerate(study.loads) if item.surface]
     return tuple(named)
@@ -107,6 +109,12 @@ def _contact_problems(study: Study) -> Iterator[str]:
     for name, pair in study.contacts.items():
         if pair.slave.split(".")[0] == pair.master.split(".")[0]:
             yield f"[contacts.{name}] slave and master belong to the same block; got '{pair.slave}', '{pair.master}'"
+    for name, bolt in study.bolts.items():
+        if bolt.body not in study.bodies:
+            yield unknown(f"[bolts.{name}] body:", "body", bolt.body, study.bodies)
+    bolted = [bolt.body for bolt in study.bolts.values()]
+    if len(set(bolted)) < len(bolted):
+        yield f"[bolts] each needs a body of its own; got {', '.join(bolted)}"
     names = [load.name for load in study.loads]
     if len(set(names)) < len(names):
         yield f"[[loads]] names must differ; got {', '.join(names)}"

@@ -12,7 +12,6 @@ from romgen.settings.base import (
     Force,
     Length,
     Modulus,
-    Penalty,
     PositiveLength,
     PositiveTime,
     Pressure,
@@ -71,16 +70,6 @@ class BlockSettings(Settings):
         """Return the breakpoints (m) and the cells between them along one axis."""
         axes = {"x": (self.x, self.cells_x), "y": (self.y, self.cells_y), "z": (self.z, self.cells_z)}
         return axes[name]
-
-
-class ContactSettings(Settings):
-    """Table [contacts.<name>]: a frictional pair of block faces; penalties default from E and mesh size."""
-
-    slave: str
-    master: str
-    friction: float = Field(ge=0.0)
-    normal_penalty: Penalty | None = None
-    tangential_penalty: Penalty | None = None
 
 
 class ConstraintSettings(Settings):

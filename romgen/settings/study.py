@@ -12,7 +12,6 @@ from romgen.settings.finite_elements import (
     BaseAccelerationSettings,
     BlockSettings,
     ConstraintSettings,
-    ContactSettings,
     LoadSettings,
     MaterialSettings,
     ModesSettings,
@@ -20,6 +19,7 @@ from romgen.settings.finite_elements import (
     RingDownSettings,
     SensorSettings,
 )
+from romgen.settings.joints import BoltSettings, ContactSettings, TieSettings
 from romgen.settings.learning import (
     AcceptanceSettings,
     FmuSettings,
@@ -47,6 +47,8 @@ class Study(Settings):
     meshes: dict[str, MeshSettings] = Field(default_factory=dict)
     regions: dict[str, RegionSettings] = Field(default_factory=dict)
     contacts: dict[str, ContactSettings] = Field(default_factory=dict)
+    ties: dict[str, TieSettings] = Field(default_factory=dict)
+    bolts: dict[str, BoltSettings] = Field(default_factory=dict)
     constraints: tuple[ConstraintSettings, ...] = ()
     loads: tuple[LoadSettings, ...] = ()
     preload: PreloadSettings = PreloadSettings()
