@@ -8,6 +8,8 @@ from fem.block import graded, hex_block
 from fem.bolt import Bolt
 from fem.campaign import Observation, Starts, march_campaign, modal_coordinates, modal_starts, snap_back_starts
 from fem.central_difference import ExplicitSettings, ExplicitTransient
+from fem.contact_report import PenaltyReport, penalty_reports
+from fem.equilibrium import InterfaceState, interface_states
 from fem.errors import FemConvergenceError, FemError, FemInputError
 from fem.excitation import TimeLoad, base_load, time_load
 from fem.interfaces import Pair, Tie
@@ -19,12 +21,14 @@ from fem.modal_quantities import effective_masses, mac, near_integer_ratios, par
 from fem.model import Body, Model, build_model
 from fem.modes import ModalBasis, Rayleigh, no_modes, rayleigh, rest_state, solve_modes
 from fem.motion import MotionState, StepRecord
-from fem.preload import StaticSettings, StaticState, solve_static
+from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
 from fem.reaction import reaction
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
+from fem.sliding import SlidingWarning
 from fem.stress import integration_point_stress, nodal_stress
 from fem.supports import Support
+from fem.tightening import bolt_force
 from fem.transient import Transient, TransientSettings
 
 __all__ = [
@@ -39,6 +43,7 @@ __all__ = [
     "FemInputError",
     "Force",
     "Gravity",
+    "InterfaceState",
     "Material",
     "Mesh",
     "ModalBasis",
@@ -47,10 +52,12 @@ __all__ = [
     "Observation",
     "Pair",
     "PathSettings",
+    "PenaltyReport",
     "PointForce",
     "Pressure",
     "Rayleigh",
     "Sensor",
+    "SlidingWarning",
     "Starts",
     "StaticSettings",
     "StaticState",
@@ -62,12 +69,15 @@ __all__ = [
     "Transient",
     "TransientSettings",
     "base_load",
+    "bolt_force",
     "build_model",
     "effective_masses",
     "follow_path",
     "graded",
     "hex_block",
     "integration_point_stress",
+    "interface_states",
+    "lock_bolts",
     "mac",
     "march_campaign",
     "merged",
@@ -77,6 +87,7 @@ __all__ = [
     "no_modes",
     "nodal_stress",
     "participation_factors",
+    "penalty_reports",
     "rayleigh",
     "reaction",
     "read_mesh",
@@ -84,6 +95,7 @@ __all__ = [
     "sensor_rows",
     "snap_back_starts",
     "solve_modes",
+    "solve_preload",
     "solve_static",
     "time_load",
     "total_masses",
