@@ -17,7 +17,7 @@ def test_example_of_the_manual() -> None:
     2 %: a clamp that hinders lateral strain and a strip four times as wide as high stiffen by up to nu^2 times the
     share of the root; Timoshenko's correction and the mesh are below 0.3 %.
     """
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)[0]
     assert len([line for line in code.splitlines() if line.strip()]) <= 40
     names: dict[str, object] = {}
     exec(compile(code, str(PAGE), "exec"), names)
