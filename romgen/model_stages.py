@@ -99,6 +99,9 @@ def march_ringdowns(context: Context) -> RingDowns:
         context, fe.Segment, lambda last: fe.march_ringdowns(study, preload, modes, last), settings.duration
     )
     joined = fe.join_ringdowns(segments, study, modes)
+    halved = int(joined[0].effort.rejected.sum())
+    if halved and settings.error_tolerance is None:
+        log.warning("%d time steps did not converge and were halved; a smaller time_step may be faster", halved)
     count = len(settings.training)
     return RingDowns(joined[:count], joined[count:])
 
