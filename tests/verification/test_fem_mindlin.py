@@ -148,9 +148,9 @@ def _pushed_spheres(cells: int, coarse: int, sideways: float) -> tuple[float, fl
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("cells", "coarse", "sideways"), [(6, 5, 0.56e-6), (6, 5, 1.07e-6), (6, 5, 1.74e-6)])
+@pytest.mark.parametrize(("cells", "coarse", "sideways"), [(6, 5, 0.56e-6), (6, 5, 1.07e-6)])
 def test_v16_v17_spheres(cells: int, coarse: int, sideways: float) -> None:
-    """V16 and V17 on spheres, P = 100 N, r about 0.25, 0.5, 0.75: c/a = (1 - r)^(1/3) to 5 %, work to 10 % (manual).
+    """V16 and V17 on spheres, P = 100 N, r about 0.25 and 0.5: c/a = (1 - r)^(1/3) to 5 %, work to 10 % (manual).
 
     At r = 0.25 the sliding ring is 0.09 a wide and the facets 0.22 a: only the stick radius is checked there.
     """
