@@ -10,7 +10,7 @@ from pydantic import BaseModel
 import romgen.settings as settings
 
 PAGE = (Path(__file__).parents[3] / "docs" / "study.md").read_text(encoding="utf-8")
-DOCUMENTED = {word.rsplit(".", 1)[-1] for word in re.findall(r"`([a-z_]+(?:\.[a-zA-Z_]+)*)`", PAGE)}
+DOCUMENTED = {word.rsplit(".", 1)[-1] for word in re.findall(r"`([a-z_][a-z0-9_]*(?:\.[a-zA-Z_]+)*)`", PAGE)}
 TABLES = [
     table
     for table in vars(settings).values()
