@@ -16,6 +16,7 @@ from romgen.fmu.export3 import export_fmi3
 from romgen.fmu.levels import validate_unit
 from romgen.fmu.python_export import export_pythonfmu
 from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo, FmuLevels
+from romgen.fmu.reference_files import write_reference_files
 from romgen.learning_stages import learned, learned_model
 from romgen.metrics import nmte_percent
 from romgen.settings import Study
@@ -106,6 +107,7 @@ def _base_share(study: Study) -> tuple[float, ...]:
 def validate(context: Context) -> Validation:
     """Check the units with fmpy against the Python model, and replay the held-out motions."""
     if context.study.fmu.start == "state":
+        write_reference_files(_path(context, ""), context.run_dir / "fmu_reference")
         return _validate(context, _path(context, ""))
     # Motions are replayed from states; a unit that starts from sensors is checked through a twin without that.
     with tempfile.TemporaryDirectory(prefix="romgen_twin_") as folder:
