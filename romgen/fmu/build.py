@@ -82,10 +82,8 @@ def build_binaries(
 
 
 def _message(compiler: Compiler, name: str) -> str:
-    if not (compiler.is_zig and is_first_use(name)):
-        return f"compiling {name}"
-    wait = "about two minutes" if name == "win64" else "some seconds"
-    return f"compiling {name}; building its C library once, {wait}"
+    first = compiler.is_zig and is_first_use(name)
+    return f"compiling {name}" + ("; zig prepares this platform once, some seconds" if first else "")
 
 
 def _compile(compiler: Compiler, name: str, folder: Path, library: str) -> bytes:

@@ -155,12 +155,12 @@ def cache_folder() -> Path:
 
 
 def is_first_use(platform_name: str) -> bool:
-    """Whether zig has still to build the C library of a platform (about two minutes for Windows)."""
+    """Whether zig has still to build what a platform needs once."""
     return not _mark(platform_name).exists()
 
 
 def remember_use(platform_name: str) -> None:
-    """Note that the C library of a platform is built."""
+    """Note that this is done."""
     _mark(platform_name).parent.mkdir(parents=True, exist_ok=True)
     _mark(platform_name).touch()
 

@@ -48,7 +48,7 @@ def export_fmu(
     path : file to write.
     settings : sensors, platforms and step size.
     info : texts of the description and the documentation.
-    report : told the finished fraction while compilers run; the first Windows build takes about two minutes.
+    report : told the finished fraction while compilers run.
 
     Raises
     ------

@@ -151,7 +151,7 @@ def test_universal_file_holds_both_slices_on_page_boundaries() -> None:
 
 @pytest.mark.slow
 def test_all_platforms_from_one_machine(tmp_path: Path) -> None:
-    """Five platforms; the first Windows build takes about two minutes."""
+    """Five platforms, twice: the same bytes."""
     if importlib.util.find_spec("ziglang") is None:
         pytest.skip("ziglang is not installed")
     one, two = (export_fmu(random_model(5), tmp_path / n / "x.fmu", FmuSettings(platforms=("all",))) for n in "ab")
