@@ -6,6 +6,7 @@ import importlib.util
 import os
 import platform
 import shutil
+import struct
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -124,12 +125,20 @@ def _compile_for_windows(compiler: Compiler, target: str, sources: Path, output:
     objects = [f"{Path(name).stem}.obj" for name in (*files, "dll_entry.c")]
     for name, compiled in zip((*files, "dll_entry.c"), objects, strict=True):
         _run(compiler, target, [*compiler.command, *compile_flags, "-c", name, "-o", compiled], sources)
-    library = ["dlltool", "-m", "i386:x86-64", "-d", "msvcrt.def", "-l", "msvcrt.lib"]
-    _run(compiler, target, [*compiler.command[:-1], *library], sources)
+    tool = ["dlltool", "-m", "i386:x86-64", "-d", "msvcrt.def", "-l", "msvcrt.lib"]
+    _run(compiler, target, [*compiler.command[:-1], *tool], sources)
     link = ["-target", target, "-shared", "-s", "-nostdlib", "-o", str(output), *objects, "msvcrt.lib"]
     _run(compiler, target, [*compiler.command, *link], sources)
+    library = sources / output
+    library.write_bytes(without_time(library.read_bytes()))
     for name in ("dll_entry.c", "msvcrt.def", "msvcrt.lib", *objects):
         (sources / name).unlink(missing_ok=True)
+
+
+def without_time(library: bytes) -> bytes:
+    """A Windows library whose header says 0 as time of linking, which the linker takes from the clock (PE format)."""
+    (header,) = struct.unpack_from("<I", library, 0x3C)
+    return library[: header + 8] + bytes(4) + library[header + 12 :]
 
 
 def _run(compiler: Compiler, target: str | None, command: list[str], folder: Path) -> None:
