@@ -23,7 +23,7 @@ from fem.arrays import FloatArray
 from fem.campaign import Starts, modal_coordinates, snap_back_starts
 from fem.compiled import threaded
 from fem.model import Model
-from fem.modes import rayleigh, solve_modes
+from fem.modes import ModalBasis, rayleigh, solve_modes
 from fem.preload import StaticSettings, solve_static
 from fem.transient import Transient, TransientSettings
 from romgen.fe_stages import build
@@ -38,6 +38,7 @@ MESHES = {
 }
 STEPS = {1: 200, 5: 60}
 DURATION = 0.8
+Ready = tuple[Transient, ModalBasis]
 TARGET_H = {("20k", 1): 0.05, ("188k", 1): 2.0, ("188k", 5): 6.0}
 
 
@@ -77,7 +78,7 @@ def bandwidth() -> float:
     return float(x.nbytes / (1e-3 * median_ms(lambda: _read(x, out))))
 
 
-def prepare(model: Model, study: Study, n_case: int) -> tuple[Transient, Starts]:
+def prepare(model: Model, study: Study, n_case: int) -> tuple[Ready, Starts]:
     """Preload, modes, factor and static starts of the first ring-downs of the study."""
     assert study.ringdowns is not None
     with stage("preload"):
@@ -92,13 +93,12 @@ def prepare(model: Model, study: Study, n_case: int) -> tuple[Transient, Starts]
         transient = Transient(model, state, modes, damping, settings, force_scale=scale)
     with stage(f"static starts ({n_case})"):
         starts = snap_back_starts(transient, modes, etas)
-    return transient, starts
+    return (transient, modes), starts
 
 
-def parts(transient: Transient, u: FloatArray, slip: FloatArray) -> dict[str, float]:
+def parts(transient: Transient, modes: ModalBasis, u: FloatArray, slip: FloatArray) -> dict[str, float]:
     """Median ms of the parts of one iteration."""
     dynamics = transient.dynamics
-    contact = dynamics.contact(u, slip)
     residual, live = np.ones_like(u), np.arange(u.shape[1])
     anderson = Anderson(len(u), u.shape[1], transient.settings.depth)
     for _ in range(transient.settings.depth):
@@ -109,15 +109,16 @@ def parts(transient: Transient, u: FloatArray, slip: FloatArray) -> dict[str, fl
         "contact": median_ms(lambda: dynamics.contact_force(dynamics.contact(u, slip))),
         "solve": median_ms(lambda: transient.precondition(residual)),
         "acceleration": median_ms(lambda: anderson.step(live, residual)),
-        "output": median_ms(lambda: (transient.modes.left.T @ u, contact.slip.copy())),
+        "output": median_ms(lambda: (modes.left.T @ u, modes.shapes.T @ u, u.astype(np.float32))),
     }
 
 
-def march(name: str, transient: Transient, starts: Starts, speed: float) -> None:
+def march(name: str, ready: Ready, starts: Starts, speed: float) -> None:
     """Print parts and steps of the cases of ``starts``; ``speed`` of memory in bytes per second."""
+    transient, modes = ready
     n_case = starts.displacement.shape[1]
     state = transient.start(starts.displacement, np.zeros_like(starts.displacement), starts.slip, settled=True)
-    for part, ms in parts(transient, state.u, state.slip).items():
+    for part, ms in parts(transient, modes, state.u, state.slip).items():
         print(f"  {part + f' ({n_case})':<28}{ms:>10.2f} ms", flush=True)
     times, iterations, begin = [], [], time.perf_counter()
     for record in transient.march(state, STEPS[n_case]):
@@ -125,13 +126,17 @@ def march(name: str, transient: Transient, starts: Starts, speed: float) -> None
         iterations.append(float(record.iterations.max()))
     steps = np.diff([begin, *times])
     median, mean = statistics.median(steps), statistics.mean(iterations)
-    factor = 8.0 * transient.factor_entries()
+    factor = 8.0 * transient.statistics.factor_entries  # two sweeps in single precision
     floor = (mean * factor) / speed
     hours = median * DURATION / transient.settings.time_step / 3600.0
     print(f"  {f'step ({n_case}), median of {len(steps)}':<28}{1e3 * median:>10.1f} ms, {mean:.2f} iterations")
-    print(f"  {'  reading the factor':<28}{1e3 * floor:>10.1f} ms at {speed / 1e9:.1f} GB/s: {median / floor:.1f} times")
+    print(
+        f"  {'  reading the factor':<28}{1e3 * floor:>10.1f} ms at {speed / 1e9:.1f} GB/s: {median / floor:.1f} times"
+    )
     target = TARGET_H.get((name, n_case))
-    print(f"  {f'{DURATION} s of ring-down ({n_case})':<28}{hours:>10.2f} h" + (f", target {target} h" if target else ""))
+    print(
+        f"  {f'{DURATION} s of ring-down ({n_case})':<28}{hours:>10.2f} h" + (f", target {target} h" if target else "")
+    )
 
 
 def main() -> None:
@@ -143,12 +148,12 @@ def main() -> None:
         model = build(study)
         print(f"{name}: {model.n_dof} DOF, {model.contact.n_point} contact points", flush=True)
         print(f"  {'mesh and assembly':<28}{time.perf_counter() - begin:>10.1f} s", flush=True)
-        transient, starts = prepare(model, study, max(STEPS))
+        ready, starts = prepare(model, study, max(STEPS))
         for n_case in STEPS:
             chosen = Starts(
                 np.ascontiguousarray(starts.displacement[:, :n_case]), np.ascontiguousarray(starts.slip[..., :n_case])
             )
-            march(name, transient, chosen, speed)
+            march(name, ready, chosen, speed)
         print(f"  {'peak memory so far':<28}{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:>10.2f} GB")
 
 

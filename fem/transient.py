@@ -19,6 +19,7 @@ from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError, FemInputError
 from fem.excitation import Amplitude, TimeLoad, base_load
 from fem.generalized_alpha import Scheme
+from fem.linear_solver import SolverStatistics
 from fem.model import Model
 from fem.modes import ModalBasis, Rayleigh
 from fem.motion import Effort, MotionState, SolvedStep, StepRecord, extrapolated
@@ -173,6 +174,11 @@ class Transient:
                 yield replace(at, effort=effort)
                 effort = Effort.none(n_case)
             state = new
+
+    @property
+    def statistics(self) -> SolverStatistics:
+        """Times, entries and memory of the factor that all cases share."""
+        return self._preconditioner.rest(0).statistics
 
     def precondition(self, residual: FloatArray) -> FloatArray:
         """Acceleration correction A^-1 r of the frozen factor, (n_dof, n_case) from forces (n_dof, n_case)."""
