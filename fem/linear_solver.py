@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import time
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,6 +15,8 @@ import scipy.sparse.linalg as spla
 
 from fem.arrays import FloatArray
 from fem.errors import FemConvergenceError, FemInputError
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,17 @@ class SuperLU:
         return SolverStatistics(self.name, entries, 12 * entries, self._solves, **self._seconds)
 
 
+@cache
 def available_solvers() -> tuple[str, ...]:
     """Names of the solvers that can be used here, fastest first."""
-    return ("pardiso", "superlu") if importlib.util.find_spec("pypardiso") else ("superlu",)
+    if not importlib.util.find_spec("pypardiso"):
+        return ("superlu",)
+    try:
+        importlib.import_module("fem.pardiso").load_mkl()
+    except (ImportError, OSError) as error:
+        log.warning("pypardiso is installed but its MKL does not load (%s): the slower SuperLU takes over", error)
+        return ("superlu",)
+    return ("pardiso", "superlu")
 
 
 def make_solver(name: str = "auto", *, symmetric: bool, single: bool = False) -> LinearSolver:

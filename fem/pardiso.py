@@ -41,7 +41,7 @@ class Pardiso:
     def __init__(self, *, symmetric: bool, single: bool = False) -> None:
         self._mtype = _SPD if symmetric else _UNSYMMETRIC
         self._dtype: Any = np.float32 if single else np.float64
-        self._handle = _Handle(_mkl(), self._mtype)
+        self._handle = _Handle(load_mkl(), self._mtype)
         self._handle.iparm[27] = int(single)
         if not symmetric:
             self._handle.iparm[[10, 12]] = 1, 1
@@ -92,8 +92,8 @@ class Pardiso:
 
 
 @cache
-def _mkl() -> Callable[..., None]:
-    """MKL's pardiso; finding the library searches the whole environment, so once per process."""
+def load_mkl() -> Callable[..., None]:
+    """MKL's pardiso, ``ImportError`` where it is missing; finding the library searches the whole environment, so once per process."""
     # Loads MKL, so not before the environment above is set.
     solver = importlib.import_module("pypardiso").PyPardisoSolver()
     function: Callable[..., None] = solver._mkl_pardiso
