@@ -93,7 +93,10 @@ class Pardiso:
 
 @cache
 def load_mkl() -> Callable[..., None]:
-    """MKL's pardiso, ``ImportError`` where it is missing; finding the library searches the whole environment, so once per process."""
+    """MKL's pardiso; ``ImportError`` where it is missing.
+
+    Finding the library searches the whole environment, so once per process.
+    """
     # Loads MKL, so not before the environment above is set.
     solver = importlib.import_module("pypardiso").PyPardisoSolver()
     function: Callable[..., None] = solver._mkl_pardiso

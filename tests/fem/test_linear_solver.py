@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -82,3 +85,19 @@ def test_threaded_product_equals_scipy() -> None:
     x = np.random.default_rng(3).standard_normal((matrix.shape[0], 4))
     # Five to seven terms per row: a few units in the last place.
     np.testing.assert_allclose(SparseProduct(matrix)(x), matrix @ x, atol=1e-14)
+
+
+def test_mkl_that_does_not_load_gives_way(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    """Such as a wheel whose libraries were removed: the name is found, the library is not."""
+
+    def missing(name: str) -> object:
+        raise ImportError("Shared library mkl_rt not found")
+
+    available_solvers.cache_clear()
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: True)
+    monkeypatch.setattr(importlib, "import_module", missing)
+    try:
+        assert available_solvers() == ("superlu",)
+        assert "mkl_rt not found" in caplog.text
+    finally:
+        available_solvers.cache_clear()
