@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from romgen.arrays import ComplexArray, FloatArray
+from romgen.arrays import BoolArray, ComplexArray, FloatArray
 from romgen.chart import ReducedTrajectory
 from romgen.errors import NumericalError
 from romgen.etdrk4 import largest_step
-from romgen.polynomial import evaluate, jacobian, zeta
+from romgen.polynomial import PolynomialMap, evaluate, jacobian, zeta
 from romgen.reduced_model import ReducedModel
 from romgen.simulate import chart_inverse
 from romgen.variational import sensitivities
 
 # The window is this many periods of the slowest mode: beats of two modes need more than one.
 WINDOW_PERIODS = 3.0
-STEPS = 10
+STEPS = 20
+HALVINGS, DECREASE = 6, 1e-9
 
 
 def fitted_start(model: ReducedModel, r: ReducedTrajectory) -> ComplexArray:
-    """Return z at r.t[0] that fits y / s over the first three periods of the slowest mode by Gauss-Newton.
+    """Return z at r.t[0] that fits eta over the first three periods of the slowest mode by Gauss-Newton.
 
-    Minimises sum_k abs(y_k / s - Re(T zeta(t_k)^E))^2; the start is the inverse chart of the first sample, which is
-    also the answer where the fit does not lower the misfit.
+    Minimises the sum of abs(eta_k - s Re(T zeta(t_k)^E))^2; eta' is left out, as it carries the fast modes that the
+    first periods of a motion may still have. The starts are the inverse chart of the first sample and its linear part.
 
     Raises
     ------
@@ -36,36 +37,61 @@ def fitted_start(model: ReducedModel, r: ReducedTrajectory) -> ComplexArray:
 
 
 def _candidates(model: ReducedModel, w0: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return the inverse chart at w0 = y / s, and the inverse of its linear part, which never leaves its range."""
+    y0 = w0 * model.scale
+    return chart_inverse(model, y0)[0], linear_start(model, y0)
+
+
+def linear_start(model: ReducedModel, y0: FloatArray) -> ComplexArray:
+    """Return z (m,) of y0 (2m,) by the inverse of the linear part of the chart, which never leaves its range."""
     m = len(model.eigenvalues)
     V = np.zeros((2 * m, 2 * m), dtype=np.complex128)
     linear = np.flatnonzero(model.chart.exponents.sum(axis=1) == 1)
     for k in linear:
         V[:, int(np.argmax(model.chart.exponents[k]))] = model.chart.coefficients[:, k]
     real = np.hstack([(V[:, :m] + V[:, m:]).real, -(V[:, :m] - V[:, m:]).imag])
-    parts = np.linalg.solve(real, w0)
-    return chart_inverse(model, w0 * model.scale)[0], parts[:m] + 1j * parts[m:]
+    parts = np.linalg.solve(real, y0 / model.scale)
+    z0: ComplexArray = parts[:m] + 1j * parts[m:]
+    return z0
 
 
 def _gauss_newton(model: ReducedModel, r: ReducedTrajectory, z0: ComplexArray) -> tuple[ComplexArray, float]:
-    """Return the best start found from z0 and its misfit over the window; inf where the model diverges."""
+    """Return the best start found from z0 and its misfit over the window; inf where the model diverges.
+
+    A step that does not lower the misfit is halved: far from the answer the chart is curved.
+    """
     window = r.t <= r.t[0] + WINDOW_PERIODS * 2.0 * np.pi / float(model.eigenvalues.imag.min())
-    w = r.y[window] / model.scale
-    best, smallest = z0, np.inf
+    best, (misfit, D) = z0, _misfit(model, r, window, z0)
+    m = len(z0)
+    for _ in range(STEPS):
+        if not np.isfinite(misfit).all():
+            return best, np.inf
+        change = np.linalg.lstsq(D, misfit, rcond=None)[0]
+        size = float(misfit @ misfit)
+        for halved in range(HALVINGS):
+            trial = best + 0.5**halved * (change[:m] + 1j * change[m:])
+            trial_misfit, trial_D = _misfit(model, r, window, trial)
+            if float(trial_misfit @ trial_misfit) < size * (1.0 - DECREASE):
+                break
+        else:
+            break
+        best, misfit, D = trial, trial_misfit, trial_D
+    size = float(misfit @ misfit)
+    return best, size if np.isfinite(size) else np.inf
+
+
+def _misfit(
+    model: ReducedModel, r: ReducedTrajectory, window: BoolArray, z0: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return data minus model of the modal displacements over the window, stacked, and the slope of the model."""
     m = len(z0)
     nf = (model.normal_form.exponents, model.normal_form.coefficients)
     none = np.zeros(0, dtype=np.int64)
-    for _ in range(STEPS):
-        z, S = sensitivities(r.t[window], z0, model.eigenvalues, nf, (none, none), largest_step(model.eigenvalues))
-        if not np.isfinite(z).all():
-            break
-        misfit = w - evaluate(model.chart, zeta(z)).real
-        size = float(np.sum(misfit**2))
-        if not size < smallest * (1.0 - 1e-9):
-            break
-        best, smallest = z0, size
-        slope = jacobian(model.chart, zeta(z))
-        D = (slope[:, :, :m] @ S + slope[:, :, m:] @ S.conj()).real
-        change = np.linalg.lstsq(D.reshape(-1, 2 * m), misfit.ravel(), rcond=None)[0]
-        z0 = z0 + change[:m] + 1j * change[m:]
-    return best, smallest
+    z, S = sensitivities(r.t[window], z0, model.eigenvalues, nf, (none, none), largest_step(model.eigenvalues))
+    if not np.isfinite(z).all():
+        return np.full(m * len(z), np.inf), np.zeros((m * len(z), 2 * m))
+    eta = PolynomialMap(model.chart.exponents, model.chart.coefficients[:m])
+    unit = model.scale[:m] / model.scale[:m].max()
+    slope = jacobian(eta, zeta(z))
+    D = (slope[:, :, :m] @ S + slope[:, :, m:] @ S.conj()).real * unit[:, None]
+    misfit = (r.y[window, :m] / model.scale[:m] - evaluate(eta, zeta(z)).real) * unit
+    return misfit.ravel(), D.reshape(-1, 2 * m)

@@ -14,7 +14,7 @@ from romgen.learning_notes import choice_sentence, learning_notes
 from romgen.manifold import Manifold, ManifoldFit
 from romgen.normal_form import NormalFormFit, fit_normal_form
 from romgen.order_selection import OrderTable, choose_order
-from romgen.polynomial import PolynomialMap, evaluate, exponents
+from romgen.polynomial import PolynomialMap, exponents
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
@@ -158,7 +158,6 @@ def assemble(
         maps.append(PolynomialMap(table, regression.finish(settings.ridge).coefficients))
     modal_load = np.zeros((m, 0)) if loads is None else loads.modal_load
     force = np.vstack([np.zeros_like(modal_load), modal_load]) / dynamics.scale[:, None]
-    z = evaluate(fit.inverse_chart, y / dynamics.scale)
     return ReducedModel(
         name=name,
         eigenvalues=dynamics.eigenvalues,
@@ -173,7 +172,7 @@ def assemble(
         input_units=() if loads is None else loads.units,
         input_matrix=(dynamics.inverse @ force).astype(np.complex128),
         internal_resonance=fit.resonance.internal_resonance,
-        trained_amplitude=np.abs(z).max(axis=0),
+        trained_amplitude=fit.amplitude,
     )
 
 

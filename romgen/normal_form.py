@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -38,6 +38,7 @@ class NormalFormFit:
     normal_form : N, (m, n_term) over zeta, nonlinear terms, 1/s.
     chart : T, (2m, n_term) over zeta, w = Re(T zeta^E).
     inverse_chart : H, (m, n_term) over w.
+    amplitude : (m,) largest abs(z_j) of the training motions.
     chart_error_percent : mean over samples of abs(w - Re(T zeta^E)) over the largest abs(w).
     """
 
@@ -47,6 +48,7 @@ class NormalFormFit:
     normal_form: PolynomialMap[np.complex128]
     chart: PolynomialMap[np.complex128]
     inverse_chart: PolynomialMap[np.complex128]
+    amplitude: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
     chart_error_percent: float
 
 
@@ -82,6 +84,7 @@ def fit_normal_form(
         PolynomialMap(table.exponents, conjugacy.B),
         chart,
         inverse_chart(dynamics, table.exponents, conjugacy.A),
+        np.abs(z).max(axis=0),
         relative_error_percent(w, evaluate(chart, zeta(z)).real),
     )
 

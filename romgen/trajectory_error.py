@@ -10,7 +10,7 @@ import numpy.typing as npt
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory
 from romgen.errors import NumericalError
-from romgen.initial_window import fitted_start
+from romgen.initial_window import fitted_start, linear_start
 from romgen.manifold import Manifold, nmte_blocks
 from romgen.metrics import nmte_percent
 from romgen.polynomial import evaluate
@@ -69,7 +69,7 @@ def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[Compl
     try:
         z0 = fitted_start(model, r)
     except NumericalError:
-        z0 = chart_inverse(model, r.y[0])[0]
+        z0 = linear_start(model, r.y[0])
     return z0, free_motion(model, r.t, z0)
 
 

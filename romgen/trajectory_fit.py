@@ -1,9 +1,10 @@
-"""A normal form fitted on whole trajectories: band-passed start, growing order, refinement."""
+"""A normal form fitted on whole trajectories: band-passed start, multiple shooting, growing order, refinement."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,13 +12,14 @@ from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import DROPPED, first_derivative, is_uniform
 from romgen.metrics import analytic_signal
-from romgen.normal_form import NormalFormFit, Resonance, chart_from, relative_error_percent, resonance_table
-from romgen.polynomial import PolynomialMap, evaluate, exponents, monomials, zeta
+from romgen.normal_form import NormalFormFit, Resonance, resonance_table
+from romgen.output_map import output_map
+from romgen.polynomial import monomials, zeta
 from romgen.reduced_dynamics import ReducedDynamics, fit_reduced_dynamics, modal_samples
-from romgen.refinement import RefinedDynamics, Segment, grown, refine
+from romgen.refined_chart import refined_normal_form
+from romgen.refinement import RefinedDynamics, Segment, refine, regrown
 from romgen.regression import ridge_fit
 from romgen.resonance import ResonanceTable
-from romgen.variational import sensitivities
 
 START_ORDER = 3
 # Lower edge of the first band and upper edge of the last, as shares of the modal frequency.
@@ -26,9 +28,12 @@ BAND = (0.5, 1.5)
 AMPLITUDE_FLOOR = 0.06
 EDGE_PERIODS = 1.0
 MIN_PERIODS = 20.0
-SAMPLES_PER_PERIOD = 5.0
-STEPS = 30
-RIDGE = 1e-6
+SAMPLES_PER_PERIOD = 6.0
+# Segments per motion up to SHOT_ORDER: short enough that the rates of the start lose no period within one. Two blocks
+# of the cross-validation make one, so every segment has samples that count.
+SHOTS, SHOT_ORDER = 4, 5
+SHOT_STEPS, SHOT_DECREASE = 12, 1e-3
+STEPS, DECREASE = 30, 1e-4
 
 
 def is_long_enough(training: Sequence[ReducedTrajectory]) -> bool:
@@ -52,15 +57,19 @@ def fit_on_trajectories(
     ----------
     training : uniform, at least 20 periods long.
     order, internal_resonance : as in ``normal_form.fit_normal_form``.
-    ridge : of the linear part and of the inverse chart; refinement has its own, ``RIDGE``.
+    ridge : of the linear part and of the inverse chart; refinement has priors of its own.
 
     Raises
     ------
     NumericalError : the linear part does not decay.
     """
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
-    orders = sorted({*range(min(order, START_ORDER), order, 2), order})
-    return list(growing_fits(training, everything, orders, (internal_resonance, ridge), STEPS))[-1]
+    return list(growing_fits(training, everything, growing_orders(order), (internal_resonance, ridge)))[-1]
+
+
+def growing_orders(order: int) -> list[int]:
+    """Return 3, 5, .. up to ``order``, itself included."""
+    return sorted({*range(min(order, START_ORDER), order, 2), order})
 
 
 def growing_fits(
@@ -68,9 +77,11 @@ def growing_fits(
     kept: Sequence[BoolArray],
     orders: Sequence[int],
     settings: tuple[Resonance, float],
-    steps: int,
 ) -> Iterator[NormalFormFit]:
     """Start from band-passed modal coordinates at the first order, refine, grow to the next, refine, ..
+
+    Up to order 5 every motion is first cut into segments with initial states of their own: over a whole motion the
+    frequencies of the start are wrong by periods, and the cost has minima that are off by one.
 
     Parameters
     ----------
@@ -78,7 +89,6 @@ def growing_fits(
     kept : (n_time,) per trajectory, samples that count; simulation passes through the others.
     orders : increasing.
     settings : internal resonance; ridge of the linear part and of the inverse chart.
-    steps : largest number of Levenberg-Marquardt steps per order.
 
     Yields
     ------
@@ -87,18 +97,23 @@ def growing_fits(
     internal_resonance, ridge = settings
     seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
     dynamics = fit_reduced_dynamics(seen, min(orders[0], START_ORDER), ridge)
-    table = resonance_table(dynamics.eigenvalues, orders[0], internal_resonance)
     signals = [_signals(dynamics, r) for r in training]
-    eigenvalues, B = _rates(dynamics, training, (signals, kept), table)
-    model = RefinedDynamics(
-        eigenvalues, eigenvalues, table.exponents, table.resonant, ~table.resonant, B, np.zeros_like(B)
+    model = _start(
+        dynamics, training, (signals, kept), resonance_table(dynamics.eigenvalues, orders[0], internal_resonance)
     )
-    segments = tuple(_segment(dynamics, *parts) for parts in zip(training, signals, kept, strict=True))
     max_step = 2.0 * np.pi / (20.0 * float(dynamics.eigenvalues.imag.max()))
+    shots = _segments(dynamics, training, (signals, kept), SHOTS)
+    whole = _segments(dynamics, training, (signals, kept), 1)
+    first = [next(k for k, s in enumerate(shots) if s.motion == number) for number in range(len(training))]
+    shooting = model
     for order in orders:
         table = resonance_table(dynamics.eigenvalues, order, internal_resonance)
-        model, segments = refine(grown(model, table.exponents, table.resonant), segments, RIDGE, max_step, steps)
-        yield _normal_form(dynamics, model, table, segments, ridge)
+        if order <= SHOT_ORDER or order == orders[0]:
+            shooting, shots = refine(regrown(shooting, table), shots, max_step, SHOT_STEPS, SHOT_DECREASE)
+            model = shooting
+            whole = tuple(replace(s, z0=shots[k].z0) for s, k in zip(whole, first, strict=True))
+        model, whole = refine(regrown(model, table), whole, max_step, STEPS, DECREASE)
+        yield refined_normal_form(dynamics, model, table, whole, (ridge, max_step))
 
 
 def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:
@@ -118,6 +133,32 @@ def _signals(dynamics: ReducedDynamics, r: ReducedTrajectory) -> ComplexArray:
 def _edge(r: ReducedTrajectory, eigenvalues: ComplexArray) -> int:
     """Return the samples in EDGE_PERIODS of the slowest mode, where a band-pass is distorted."""
     return int(np.ceil(EDGE_PERIODS * 2.0 * np.pi / float(eigenvalues.imag.min()) / (r.t[1] - r.t[0])))
+
+
+def _start(
+    dynamics: ReducedDynamics,
+    training: Sequence[ReducedTrajectory],
+    signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
+    table: ResonanceTable,
+) -> RefinedDynamics:
+    """Return Lambda and B of the band-passed signals, the linear displacement of the modes, and no further terms."""
+    m = len(dynamics.eigenvalues)
+    eigenvalues, B = _rates(dynamics, training, signals, table)
+    # w = 2 Re(V q), so eta_j = s_j Re(2 V_jj z_j) and the rest
+    linear = 2.0 * dynamics.scale[:m] * np.diag(dynamics.vectors[:m])
+    output = output_map(linear.astype(np.complex128), table)
+    amplitude = np.max([np.abs(z[keep]).max(axis=0) for z, keep in zip(*signals, strict=True)], axis=0)
+    return RefinedDynamics(
+        eigenvalues=eigenvalues,
+        reference=eigenvalues,
+        amplitude=amplitude,
+        exponents=table.exponents,
+        resonant=table.resonant,
+        B=B,
+        output=output,
+        C=np.zeros(output.terms.shape, dtype=np.complex128),
+        rest=np.zeros((len(training), m)),
+    )
 
 
 def _rates(
@@ -148,46 +189,30 @@ def _rates(
     return eigenvalues, B
 
 
-def _segment(dynamics: ReducedDynamics, r: ReducedTrajectory, signal: ComplexArray, keep: BoolArray) -> Segment:
-    """Return the whole trajectory, thinned to a few samples per period of the fastest mode.
-
-    The start comes from the first undistorted sample of the signal, turned back by the linear part.
-    """
-    edge = _edge(r, dynamics.eigenvalues)
-    start = signal[edge] * np.exp(-dynamics.eigenvalues * (r.t[edge] - r.t[0]))
-    period = 2.0 * np.pi / float(dynamics.eigenvalues.imag.max())
-    stride = max(1, int(period / (SAMPLES_PER_PERIOD * (r.t[1] - r.t[0]))))
-    q = modal_samples(dynamics, r)[0]
-    return Segment(r.t[::stride], q[::stride], start, keep[::stride])
-
-
-def _normal_form(
+def _segments(
     dynamics: ReducedDynamics,
-    model: RefinedDynamics,
-    table: ResonanceTable,
-    segments: Sequence[Segment],
-    ridge: float,
-) -> NormalFormFit:
-    """Return the refined model with its charts; the inverse chart is regressed on the simulated trajectories."""
-    none = np.zeros(0, dtype=np.int64)
-    max_step = 2.0 * np.pi / (20.0 * float(dynamics.eigenvalues.imag.max()))
-    normal_form = PolynomialMap(model.exponents, model.B)
-    z = np.vstack(
-        [
-            sensitivities(s.t, s.z0, model.eigenvalues, (model.exponents, model.B), (none, none), max_step)[0][s.kept]
-            for s in segments
-        ]
-    )
-    w = 2.0 * (np.vstack([s.q[s.kept] for s in segments]) @ dynamics.vectors.T).real
-    E = exponents(w.shape[1], 1, int(model.exponents.sum(axis=1).max()))
-    H = ridge_fit(monomials(w, E).astype(np.complex128), z, ridge)
-    chart = chart_from(dynamics, model.exponents, model.C)
-    return NormalFormFit(
-        dynamics=replace(dynamics, eigenvalues=model.eigenvalues),
-        resonance=table,
-        conjugacy=None,
-        normal_form=normal_form,
-        chart=chart,
-        inverse_chart=PolynomialMap(E, H),
-        chart_error_percent=relative_error_percent(w, evaluate(chart, zeta(z)).real),
-    )
+    training: Sequence[ReducedTrajectory],
+    signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
+    n: int,
+) -> tuple[Segment, ...]:
+    """Return n segments of each motion that have samples that count, thinned to a few per period of the fastest mode.
+
+    Initial states are those of the signals, at the start from its first undistorted sample, turned back by the linear
+    part.
+    """
+    period = 2.0 * np.pi / float(dynamics.eigenvalues.imag.max())
+    m = len(dynamics.eigenvalues)
+    segments = []
+    for number, (r, signal, keep) in enumerate(zip(training, *signals, strict=True)):
+        edge = _edge(r, dynamics.eigenvalues)
+        stride = max(1, int(period / (SAMPLES_PER_PERIOD * (r.t[1] - r.t[0]))))
+        share = 1.0 / float(np.linalg.norm(r.y[keep, :m], axis=1).max())
+        bounds = np.arange(n + 1) * len(r.t) // n
+        for k, (first, last) in enumerate(pairwise(bounds)):
+            rows = slice(int(first), int(last), stride)
+            if k > 0 and not keep[rows].any():
+                continue
+            turned = signal[edge] * np.exp(-dynamics.eigenvalues * (r.t[edge] - r.t[0]))
+            z0 = turned if k == 0 else signal[first]
+            segments.append(Segment(r.t[rows], r.y[rows, :m], z0, keep[rows], number, share))
+    return tuple(segments)
