@@ -22,6 +22,7 @@ from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.rigid_motion import loose_bodies, loose_motion
+from fem.tangent_solver import TangentSolver
 
 _ROUNDOFF = 1e-14
 """Share of the forces inside a body that cancellation leaves in its residual."""
@@ -29,6 +30,9 @@ _ROUNDOFF = 1e-14
 _LENGTHS = (1.0, 0.5, 0.25, 0.125)
 """Lengths of the second attempt. The first takes whole steps: where a thin part turns, its membrane force makes the
 residual grow before it falls, and halving by it would creep (14 iterations instead of 4 on a clamped strip)."""
+
+LARGE = 50_000
+"""Degrees of freedom from which GMRES on a symmetric factor beats a new unsymmetric factor in every iteration."""
 
 _CLOSING_STEPS = 4
 """Attempts to bring surfaces together that must hold a loose body, before the interface counts as one that opens."""
@@ -88,6 +92,7 @@ class LoadStep:
     def __init__(self, model: Model, target: Target, slip: FloatArray, tolerance: Tolerance) -> None:
         self.model, self.target, self._slip, self._tolerance = model, target, slip, tolerance
         self._closing = 0
+        self._large = TangentSolver(np.empty((model.n_dof, 0)), tolerance.solver)
 
     def solve(self, u: FloatArray, shortening: FloatArray) -> Point:
         """Iterate from u (n_dof,) and shortening (n_bolt,) to balance.
@@ -165,7 +170,7 @@ class LoadStep:
             contact = model.contact.tangent(point.u, self._slip[:, :, 0])
         full = model.elastic_tangent(point.u) + contact
         right = np.where(model.free, residual - full @ moved, moved) if driving else residual
-        du, dd = self._direction(full, right, point.bolt_residual)
+        du, dd = self._direction(point, full, right)
         best: Point | None = None
         for length in lengths:
             trial = self._at(point.u + length * du, point.shortening + length * dd)
@@ -178,8 +183,18 @@ class LoadStep:
             self._rescale(best, full @ moved)
         return best
 
-    def _direction(self, full: sp.csr_matrix, right: FloatArray, miss: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _symmetric(self, point: Point, full: sp.csr_matrix) -> sp.csr_matrix:
+        """The tangent without how the limit of friction follows the pressure."""
+        contact = self.model.contact
+        change = contact.tangent(point.u, self._slip[:, :, 0], symmetric=True)
+        change = change - contact.tangent(point.u, self._slip[:, :, 0])
+        return self.model.constrain(full + change)
+
+    def _direction(self, point: Point, full: sp.csr_matrix, right: FloatArray) -> tuple[FloatArray, FloatArray]:
         tangent = self.model.constrain(full)
+        if self.target.bolts is None and self.model.n_dof >= LARGE:
+            du = self._large.solve(tangent, lambda: self._symmetric(point, full), right, np.empty(0))[0]
+            return du, np.zeros(len(self.model.bolts.bolts))
         solver = make_solver(self._tolerance.solver, symmetric=False)
         solver.analyse(tangent)
         solver.factor(tangent)
@@ -189,7 +204,7 @@ class LoadStep:
         pull = np.where(self.model.free, bolts.pull, 0.0)
         solution = solver.solve(np.column_stack([right, pull.T]))
         compliance = np.diag(bolts.stiffness) - bolts.pull @ solution[:, 1:]
-        dd = np.linalg.solve(compliance, miss - bolts.pull @ solution[:, 0])
+        dd = np.linalg.solve(compliance, point.bolt_residual - bolts.pull @ solution[:, 0])
         return np.asarray(solution[:, 0] - solution[:, 1:] @ dd), np.asarray(dd)
 
     def _rescale(self, point: Point, forces: FloatArray) -> None:

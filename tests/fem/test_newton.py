@@ -192,3 +192,18 @@ def test_force_on_a_stuck_joint_is_what_the_points_carry() -> None:
     state = solve_static(push, push.load, ONE_STEP)
     joint = interface_states(push, state.u, state.contact)[0]
     np.testing.assert_allclose(joint.force, [500.0, -1e4, 0.0], atol=1e-4)
+
+
+def test_large_models_reach_the_same_state_without_unsymmetric_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both stop at 1e-9 of the load: limit 1e-5 of the displacement, for a compliance 1e4 times the mean one."""
+    model = clamped_strip()
+    start = solve_static(model, model.load, StaticSettings(steps=2, solver="superlu"))
+    settings = StaticSettings(steps=1, tolerance=1e-9, solver="superlu")
+    direct = solve_static(model, _pull(model, 400.0), settings, start=start)
+    monkeypatch.setattr("fem.newton.LARGE", 0)
+    closed = solve_static(model, model.load, StaticSettings(steps=2, solver="superlu"))
+    scale = np.abs(direct.u).max()
+    assert np.abs(closed.u - start.u).max() < 1e-5 * scale
+    krylov = solve_static(model, _pull(model, 400.0), settings, start=closed)
+    assert np.abs(krylov.u - direct.u).max() < 1e-5 * scale
+    np.testing.assert_array_equal(krylov.contact.status, direct.contact.status)
