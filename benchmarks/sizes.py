@@ -1,4 +1,4 @@
-"""python -m benchmarks.sizes [5k 20k 60k 188k]: time steps of the clamped panel on finer and finer meshes.
+"""python -m benchmarks.sizes [--one] [5k 20k 60k 188k]: time steps of the clamped panel on finer and finer meshes.
 
 Ring-down from 2 mm with preload, contact and friction: seconds of every stage before it, milliseconds of a step by
 part, what memory bandwidth allows, and the wall time of 0.8 s that follows from the median step around the largest
@@ -142,14 +142,15 @@ def march(name: str, ready: Ready, starts: Starts, speed: float) -> None:
 def main() -> None:
     """Print one table per mesh."""
     speed = bandwidth()
-    for name in sys.argv[1:] or MESHES:
+    counts = [n for n in STEPS if n == 1 or "--one" not in sys.argv]
+    for name in [name for name in sys.argv[1:] if name != "--one"] or MESHES:
         study = refined(name)
         begin = time.perf_counter()
         model = build(study)
         print(f"{name}: {model.n_dof} DOF, {model.contact.n_point} contact points", flush=True)
         print(f"  {'mesh and assembly':<28}{time.perf_counter() - begin:>10.1f} s", flush=True)
-        ready, starts = prepare(model, study, max(STEPS))
-        for n_case in STEPS:
+        ready, starts = prepare(model, study, max(counts))
+        for n_case in counts:
             chosen = Starts(
                 np.ascontiguousarray(starts.displacement[:, :n_case]), np.ascontiguousarray(starts.slip[..., :n_case])
             )

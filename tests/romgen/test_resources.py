@@ -16,7 +16,7 @@ def test_peak_of_memory_that_is_freed_inside_the_block() -> None:
     before = resident_bytes()
     with measured() as usage:
         block = np.ones(size // 8)
-        time.sleep(5 * SAMPLE_INTERVAL_S)
+        time.sleep(40 * SAMPLE_INTERVAL_S)  # a busy machine may starve the sampler
         del block
     assert usage.peak_memory_bytes >= before + 0.9 * size
     with measured() as idle:
