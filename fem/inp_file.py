@@ -16,8 +16,8 @@ from fem.mesh_file import MeshFile
 _SOLID = {"C3D4": "tet4", "C3D10": "tet10", "C3D8": "hex8", "C3D20": "hex20", "C3D27": "hex27"}
 _N_LOCAL = {"tet4": 4, "tet10": 10, "hex8": 8, "hex20": 20, "hex27": 27}
 # Corner nodes of the faces S1, S2, ... of the Abaqus manual, section 28.1.4, counted from 0.
-_TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
-_HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
+HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 # Number of nodes and of corners of the elements that only mark a surface or a line.
 _SURFACE = {"3": (3, 3), "6": (6, 3), "65": (6, 3), "4": (4, 4), "8": (8, 4), "9": (9, 4)}
 _SURFACE_FAMILIES = ("CPS", "CPE", "CAX", "STRI", "SFM3D", "M3D", "S")
@@ -229,7 +229,7 @@ def _element_faces(
             if label not in place:
                 continue
             element, row = place[label]
-            table = _TET_FACES if element.startswith("tet") else _HEX_FACES
+            table = TET_FACES if element.startswith("tet") else HEX_FACES
             if not 1 <= int(face[1:]) <= len(table):
                 raise FemInputError("no such face", where=f"*SURFACE {name}", value=f"{face} of a {element}")
             found.append(cells[element][row, list(table[int(face[1:]) - 1])])
