@@ -29,8 +29,7 @@ from fem.preload import StaticSettings, solve_static
 from fem.sensor import Sensor, sensor_rows
 from fem.transient import Transient, TransientSettings
 from romgen.fe_stages import build
-from romgen.settings import Study
-from romgen.settings import TieSettings
+from romgen.settings import Study, TieSettings
 
 ACCELERATION = 500.0  # m/s^2 along y: about 1 mm, two thirds of the thickness
 TIME_STEP = 1e-4
@@ -109,22 +108,22 @@ def calculix(case: Case, folder: Path) -> Outcome:
     motion += f"{TIME_STEP:.6e},{case.steps * TIME_STEP:.6e}\n"
     pulled = nodal_loads(case.model.load + case.pull)
     (folder / "modes.inp").write_text(model + static + rest + output + modes)
-    (folder / "motion.inp").write_text(model + static + rest + output + static + pulled + output + motion + rest + output)
+    # An implicit *DYNAMIC step asks for energies from the first step on.
+    energies = f"\n*EL PRINT,ELSET={case.model.bodies[0].name},TOTALS=ONLY\nELSE"
+    steps = [static + rest + energies, static + pulled, motion + rest]
+    (folder / "motion.inp").write_text(model + "".join(step + output for step in steps))
     found.note = _run(folder, "modes", case.limit_s, found.seconds)
     dat = _text(folder / "modes.dat")
     found.frequency = _frequencies(dat, case.modes)
-    preload = _displacements(dat, nodes, case)
-    found.preload = preload[-1] if "preload" in found.seconds else None
     note = _run(folder, "motion", case.limit_s, found.seconds)
     found.note = "; ".join(n for n in (found.note, note) if n)
-    moves = _displacements(_text(folder / "motion.dat"), nodes, case)
-    converged = _increments(folder / "motion.sta")
-    before = converged.count(2)
-    if before and moves and _DYNAMIC in converged:
-        rest_at, loaded_at = moves[converged.count(1) - 1], moves[converged.count(1) + before - 1]
-        found.released = loaded_at - rest_at
-        if converged.count(_DYNAMIC) == case.steps:
-            found.moved = moves[-1] - loaded_at
+    # The steps end at 1 and 2 in the time of the file; mode shapes carry 2 too, but stand in the other deck.
+    found.preload = _displacements(dat, nodes, case).get(1.0)
+    at = _displacements(_text(folder / "motion.dat"), nodes, case)
+    if 2.0 in at:
+        found.released = at[2.0] - at[1.0]
+        moved = [time for time in at if time > 2.0]
+        found.moved = at[moved[-1]] - at[2.0] if len(moved) == case.steps else None
     return found
 
 
@@ -143,14 +142,15 @@ def _run(folder: Path, name: str, limit_s: float, seconds: dict[str, float]) -> 
             process.kill()
         process.wait()
     of_step = _increments(folder / f"{name}.sta")
-    if name == "modes" and 1 in of_step and not (late and 1 == len(of_step)):
+    if name == "modes" and 1 in of_step and not (late and len(of_step) == 1):
         seconds["preload"] = stamps[of_step.count(1)] - stamps[0]
         seconds["modes"] = end - stamps[of_step.count(1)]
     motion = [b - a for step, a, b in zip(of_step, stamps, stamps[1:], strict=False) if step == _DYNAMIC]
     if len(motion) > 1:
         seconds["step"] = statistics.median(motion[1:])
     if late:
-        return f"{name}: stopped after {limit_s:.0f} s with {len(motion)} time steps done"
+        tries = sum(line.split()[:1] == [str(_DYNAMIC)] for line in _text(folder / f"{name}.cvg").splitlines())
+        return f"{name}: ccx stopped after {limit_s:.0f} s, {len(motion)} time steps converged in {tries} iterations"
     return f"{name}: ccx failed, see {folder / name}.log" if process.returncode else ""
 
 
@@ -161,27 +161,29 @@ def _text(path: Path) -> str:
 def _increments(path: Path) -> list[int]:
     """The step of every increment that converged, from the status file."""
     rows = [line.split() for line in _text(path).splitlines()]
-    # step, increment, attempt, iterations, times; an attempt that was cut back ends with U.
+    # Step, increment, attempt, iterations, times; the attempt of one that was cut back ends with U.
     return [int(row[0]) for row in rows if len(row) >= 6 and row[0].isdigit() and row[1].isdigit() and row[2].isdigit()]
 
 
-def _displacements(dat: str, nodes: np.ndarray, case: Case) -> list[np.ndarray]:
-    """Sensor displacements (n_sensor,) of every increment."""
-    found = []
-    for block in re.split(r"displacements \(vx,vy,vz\) for set SENSORS[^\n]*\n", dat)[1:]:
+def _displacements(dat: str, nodes: np.ndarray, case: Case) -> dict[float, np.ndarray]:
+    """Sensor displacements (n_sensor,) by the time of the file."""
+    found = {}
+    _, *blocks = re.split(r"displacements \(vx,vy,vz\) for set SENSORS and time +", dat)
+    for block in blocks:
+        head, *lines = [line for line in block.splitlines() if line.strip()]
         u = np.zeros(case.model.n_dof)
-        for line in block.strip().splitlines()[: len(nodes)]:
+        for line in lines[: len(nodes)]:
             node, *values = line.split()
             u[3 * int(node) - 3 : 3 * int(node)] = [float(value) for value in values]
-        found.append(case.rows @ u)
+        found[float(head)] = case.rows @ u
     return found
 
 
 def _frequencies(dat: str, count: int) -> np.ndarray | None:
-    """Frequencies in Hz from the table of eigenvalues: number, eigenvalue, rad/s, Hz, imaginary part."""
+    """Frequencies in Hz from the table: number, eigenvalue (symmetric case only), rad/s, Hz, imaginary part."""
     _, _, table = dat.partition("E I G E N V A L U E   O U T P U T")
     rows = [line.split() for line in table.splitlines()]
-    values = [float(row[3]) for row in rows if len(row) == 5 and row[0].isdigit()][:count]
+    values = [float(row[-2]) for row in rows if len(row) in {4, 5} and row[0].isdigit()][:count]
     return np.array(values) if values else None
 
 

@@ -12,6 +12,7 @@ from fem.contact_report import PenaltyReport, penalty_reports
 from fem.equilibrium import InterfaceState, interface_states
 from fem.errors import FemConvergenceError, FemError, FemInputError
 from fem.excitation import TimeLoad, base_load, time_load
+from fem.inp_writer import nodal_loads, write_inp
 from fem.interfaces import Pair, Tie
 from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
 from fem.material import Material
@@ -85,6 +86,7 @@ __all__ = [
     "modal_starts",
     "near_integer_ratios",
     "no_modes",
+    "nodal_loads",
     "nodal_stress",
     "participation_factors",
     "penalty_reports",
@@ -100,4 +102,5 @@ __all__ = [
     "time_load",
     "total_masses",
     "within",
+    "write_inp",
 ]
