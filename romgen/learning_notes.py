@@ -14,6 +14,9 @@ from romgen.reduced_model import ReducedModel
 from romgen.trajectory import Trajectory
 from romgen.trajectory_error import TrajectoryError
 
+# Share of the largest motion; an offset of one percent is as large as the error aimed at.
+NOTED_REST_PERCENT = 1.0
+
 
 def learning_notes(
     trajectories: Sequence[Trajectory],
@@ -21,7 +24,7 @@ def learning_notes(
     model: ReducedModel,
     errors: Sequence[TrajectoryError],
 ) -> tuple[str, ...]:
-    """Return what was resampled and which motions diverge.
+    """Return what was resampled, which motions diverge, and which come to rest off the equilibrium.
 
     Parameters
     ----------
@@ -29,7 +32,7 @@ def learning_notes(
     chart : None with modal coordinates.
     errors : of the model on all trajectories.
     """
-    return (*_chart_notes(trajectories, chart), *_divergences(model, errors))
+    return (*_chart_notes(trajectories, chart), *_divergences(model, errors), *_rests(errors))
 
 
 def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) -> Iterator[str]:
@@ -60,6 +63,16 @@ def _divergences(model: ReducedModel, errors: Sequence[TrajectoryError]) -> Iter
                 f"the model diverges on '{error.name}' at t = {lost:.4g} s: it starts at abs(z) = "
                 f"{_numbers(error.start)}, trained were {_numbers(model.trained_amplitude)}; "
                 "train on motions that reach these amplitudes, or lower [learn] order"
+            )
+
+
+def _rests(errors: Sequence[TrajectoryError]) -> Iterator[str]:
+    for error in errors:
+        if error.rest_percent > NOTED_REST_PERCENT:
+            yield (
+                f"trajectory '{error.name}' comes to rest {error.rest_percent:.2g} % of its largest motion off the "
+                "equilibrium (residual slip, or an offset of the sensors); the model decays to zero and misses late "
+                "samples by this much"
             )
 
 

@@ -67,5 +67,6 @@ def learning_summary(context: Context) -> dict[str, Any]:
         "first_sample_nmte_percent": {
             role: {e.name: e.first_sample_percent for e in errors} for role, errors in roles.items()
         },
+        "rest_percent": {role: {e.name: e.rest_percent for e in errors} for role, errors in roles.items()},
         "static_percent": {role: {e.name: e.static_percent for e in errors} for role, errors in roles.items()},
     }

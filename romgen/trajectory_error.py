@@ -18,6 +18,8 @@ from romgen.reduced_model import ReducedModel
 from romgen.simulate import chart_inverse, coordinates, free_motion, sensors
 from romgen.trajectory import Trajectory
 
+REST_PERIODS = 10.0
+
 
 @dataclass(frozen=True)
 class TrajectoryError:
@@ -31,6 +33,9 @@ class TrajectoryError:
     sensor_nmte_percent : NMTE of the sensor displacements.
     first_sample_percent : the same, but started from the first sample alone instead of the first window.
     static_percent : NMTE of the sensors lifted from the true reduced coordinates: the error of the manifold alone.
+    rest_percent : norm of the mean misfit of the sensors over the last ten periods of the slowest mode, relative to
+        the largest norm: what lies between the rest position of the motion and the equilibrium of the model; nan where
+        the model diverges.
     start : (m,) z of the model at t[0].
     t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m, predicted is nan from a divergence on.
     """
@@ -40,6 +45,7 @@ class TrajectoryError:
     sensor_nmte_percent: float
     first_sample_percent: float
     static_percent: float
+    rest_percent: float
     start: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
     t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
     displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
@@ -61,7 +67,15 @@ def trajectory_error(
         rows, snapshots = snapshot_rows(trajectory, r)
         error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
     static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
-    return TrajectoryError(r.name, error, sensor_error, cold, static, z0, r.t, r.displacement, predicted)
+    rest = _rest_percent(r, predicted, model)
+    return TrajectoryError(r.name, error, sensor_error, cold, static, rest, z0, r.t, r.displacement, predicted)
+
+
+def _rest_percent(r: ReducedTrajectory, predicted: FloatArray, model: ReducedModel) -> float:
+    period = 2.0 * np.pi / float(model.eigenvalues.imag.min())
+    late = r.t > r.t[-1] - REST_PERIODS * period
+    misfit = (r.displacement - predicted)[late].mean(axis=0)
+    return 100.0 * float(np.linalg.norm(misfit) / np.linalg.norm(r.displacement, axis=1).max())
 
 
 def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, ComplexArray]:

@@ -74,3 +74,14 @@ def test_divergence_is_reported_and_not_raised() -> None:
     assert "diverges on 'fast'" in notes[0]
     assert "trained were" in notes[0]
     assert learning_notes([motion], None, model, learned.training) == ()
+
+
+def test_a_motion_that_comes_to_rest_elsewhere_is_noted() -> None:
+    """The model is made of the decay about 0, the motion judged is moved by 2 % of its start."""
+    motion = decay("slipped", 0.5, 0.2, 0.0)
+    model = learn([motion], [], SETTINGS.model_copy(update={"order": 3}), "cubic").model
+    moved = replace(reduced(motion), displacement=motion.displacement + 0.01)
+    error = trajectory_error(model, moved, motion, None)
+    # relative to 0.51; the decay left at the end, exp(-1.8) of the start, averages out over ten periods to about 1 %
+    assert abs(error.rest_percent - 100 * 0.01 / 0.51) < 0.2
+    assert "'slipped' comes to rest" in learning_notes([motion], None, model, [error])[0]
