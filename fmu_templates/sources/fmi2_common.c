@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "rom_instance.h"
+#include "rom_tables.h"
 
 const char *fmi2GetTypesPlatform(void)
 {
@@ -43,7 +44,6 @@ static void copy_name(char target[], size_t size, const char *name)
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging_on)
 {
-    (void)resources; /* the coefficients are compiled in */
     (void)visible;
     rom_logger logger;
     memset(&logger, 0, sizeof logger);
@@ -63,6 +63,13 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     rom_instance *s = reason == NULL ? calloc(1, sizeof *s) : NULL;
     if (s == NULL) {
         rom_log(&logger, fmi2Error, LOG_ERROR, "fmi2Instantiate", reason != NULL ? reason : "memory is exhausted");
+        return NULL;
+    }
+    char path[ROM_PATH_SIZE];
+    reason = rom_fill_tables(resources, &s->workspace.tables, path);
+    if (reason != NULL) {
+        rom_log(&logger, fmi2Error, LOG_ERROR, reason, path);
+        free(s);
         return NULL;
     }
     s->logger = logger;

@@ -47,12 +47,12 @@ static void complex_tangents(const rom_product product[], size_t n_product, cons
 }
 
 /* rate_j = sum over the stored terms of row j of N */
-static void normal_form_rows(const rom_complex p[], rom_complex rate[])
+static void normal_form_rows(const rom_tables *t, const rom_complex p[], rom_complex rate[])
 {
     for (size_t j = 0; j < N_MODE; ++j) {
         rom_complex sum = {0.0, 0.0};
         for (size_t k = form_row[j]; k < form_row[j + 1]; ++k)
-            sum = add(sum, multiply(form_coefficient[k], p[form_term[k]]));
+            sum = add(sum, multiply(t->form[k], p[form_term[k]]));
         rate[j] = sum;
     }
 }
@@ -82,29 +82,29 @@ static void real_tangents(const rom_product product[], size_t n_product, const d
 }
 
 /* y/s = Re(T p); conjugate pairs of monomials are folded into one when the coefficients are written */
-static void chart_rows(const rom_complex p[], double y[])
+static void chart_rows(const rom_tables *t, const rom_complex p[], double y[])
 {
-    for (size_t l = 0; l < N_REDUCED; ++l)
-        y[l] = 0.0;
+    double sum[N_REDUCED] = {0.0}; /* local: compilers need not fear that y overlaps the tables */
     for (size_t k = 0; k < N_REDUCED + N_CHART_PRODUCT; ++k)
         for (size_t l = 0; l < N_REDUCED; ++l)
-            y[l] += chart_re[k][l] * p[k].re - chart_im[k][l] * p[k].im;
+            sum[l] += t->chart_re[k][l] * p[k].re - t->chart_im[k][l] * p[k].im;
+    memcpy(y, sum, sizeof sum);
 }
 
-static void sensor_rows(const double p[], double x[])
+static void sensor_rows(const rom_tables *t, const double p[], double x[])
 {
-    for (size_t i = 0; i < N_SENSOR_ROW; ++i)
-        x[i] = 0.0;
+    double sum[N_SENSOR_ROW] = {0.0};
     for (size_t k = 0; k < N_REDUCED + N_SENSOR_PRODUCT; ++k)
         for (size_t i = 0; i < N_SENSOR_ROW; ++i)
-            x[i] += sensor_coefficient[k][i] * p[k];
+            sum[i] += t->sensor[k][i] * p[k];
+    memcpy(x, sum, sizeof sum);
 }
 
 void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
 {
     pair_with_conjugate(z, w->form);
     complex_monomials(form_product, N_FORM_PRODUCT, w->form);
-    normal_form_rows(w->form, rate);
+    normal_form_rows(&w->tables, w->form, rate);
     add_inputs(u, N_INPUT, rate);
 }
 
@@ -122,7 +122,7 @@ void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const doubl
     complex_monomials(form_product, N_FORM_PRODUCT, w->form);
     pair_with_conjugate(dz, w->form_tangent);
     complex_tangents(form_product, N_FORM_PRODUCT, w->form, w->form_tangent);
-    normal_form_rows(w->form_tangent, drate);
+    normal_form_rows(&w->tables, w->form_tangent, drate);
     add_inputs(du, N_INPUT, drate);
     for (size_t j = 0; j < N_MODE; ++j)
         drate[j] = add(drate[j], multiply(eigenvalue[j], dz[j]));
@@ -132,9 +132,9 @@ void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out)
 {
     pair_with_conjugate(z, w->chart);
     complex_monomials(chart_product, N_CHART_PRODUCT, w->chart);
-    chart_rows(w->chart, w->sensor);
+    chart_rows(&w->tables, w->chart, w->sensor);
     real_monomials(sensor_product, N_SENSOR_PRODUCT, w->sensor);
-    sensor_rows(w->sensor, out->sensor);
+    sensor_rows(&w->tables, w->sensor, out->sensor);
     for (size_t j = 0; j < N_MODE; ++j) {
         out->amplitude[j] = modulus(z[j]);
         out->phase[j] = atan2(z[j].im, z[j].re);
@@ -164,9 +164,9 @@ void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_work
     rom_outputs(z, w, &out);
     pair_with_conjugate(dz, w->chart_tangent);
     complex_tangents(chart_product, N_CHART_PRODUCT, w->chart, w->chart_tangent);
-    chart_rows(w->chart_tangent, w->sensor_tangent);
+    chart_rows(&w->tables, w->chart_tangent, w->sensor_tangent);
     real_tangents(sensor_product, N_SENSOR_PRODUCT, w->sensor, w->sensor_tangent);
-    sensor_rows(w->sensor_tangent, dout->sensor);
+    sensor_rows(&w->tables, w->sensor_tangent, dout->sensor);
     amplitude_tangents(z, dz, dout);
 }
 

@@ -30,8 +30,16 @@ typedef struct {
     unsigned short left, right;
 } rom_product;
 
-/* Monomials and their tangents; kept with the instance so that no step needs memory or much stack. */
+/* The large tables of coefficients: doubles only, so that a file can hold them as one array. Each instance has its own. */
 typedef struct {
+    rom_complex form[ROM_AT_LEAST_ONE(N_FORM_TERM)];
+    double chart_re[N_REDUCED + N_CHART_PRODUCT][N_REDUCED], chart_im[N_REDUCED + N_CHART_PRODUCT][N_REDUCED];
+    double sensor[N_REDUCED + N_SENSOR_PRODUCT][N_SENSOR_ROW];
+} rom_tables;
+
+/* Tables, and monomials and their tangents; kept with the instance so that no step needs memory or much stack. */
+typedef struct {
+    rom_tables tables;
     rom_complex form[N_REDUCED + N_FORM_PRODUCT], form_tangent[N_REDUCED + N_FORM_PRODUCT];
     rom_complex chart[N_REDUCED + N_CHART_PRODUCT], chart_tangent[N_REDUCED + N_CHART_PRODUCT];
     double sensor[N_REDUCED + N_SENSOR_PRODUCT], sensor_tangent[N_REDUCED + N_SENSOR_PRODUCT];

@@ -35,15 +35,15 @@ fmi3Status rom3_refuse(const rom3_instance *i, const char *function, const char 
     return i == NULL ? fmi3Error : rom3_status(rom_refuse(i->s, function, reason));
 }
 
-static rom3_instance *new_instance(fmi2Type type, fmi3String name, fmi3String token, fmi3Boolean logging_on,
-                                   const rom3_instance *settings)
+static rom3_instance *new_instance(fmi2Type type, fmi3String name, fmi3String token, fmi3String resources,
+                                   fmi3Boolean logging_on, const rom3_instance *settings)
 {
     rom3_instance *i = calloc(1, sizeof *i);
     if (i == NULL)
         return NULL;
     *i = *settings;
     const fmi2CallbackFunctions callbacks = {hand_on, NULL, NULL, NULL, i};
-    i->s = fmi2Instantiate(name, type, token, NULL, &callbacks, fmi2False, logging_on ? fmi2True : fmi2False);
+    i->s = fmi2Instantiate(name, type, token, resources, &callbacks, fmi2False, logging_on ? fmi2True : fmi2False);
     if (i->s == NULL) {
         free(i);
         return NULL;
@@ -56,9 +56,8 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3LogMessageCallback log)
 {
     const rom3_instance settings = {NULL, log, NULL, environment, 0};
-    (void)resources;
     (void)visible;
-    return new_instance(fmi2ModelExchange, name, token, logging_on, &settings);
+    return new_instance(fmi2ModelExchange, name, token, resources, logging_on, &settings);
 }
 
 /* Asks the importer to set the inputs at a time within the step. */
@@ -79,12 +78,11 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3IntermediateUpdateCallback update)
 {
     const rom3_instance settings = {NULL, log, update, environment, 0};
-    (void)resources;
     (void)visible;
     (void)early_return; /* no step returns early */
     (void)required;
     (void)n_required;
-    rom3_instance *i = event_mode ? NULL : new_instance(fmi2CoSimulation, name, token, logging_on, &settings);
+    rom3_instance *i = event_mode ? NULL : new_instance(fmi2CoSimulation, name, token, resources, logging_on, &settings);
     if (i == NULL && event_mode && log != NULL)
         log(environment, fmi3Error, "logStatusError", "fmi3InstantiateCoSimulation: this model has no event mode");
     if (i != NULL && update != NULL) {

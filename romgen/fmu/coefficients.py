@@ -1,4 +1,4 @@
-"""The two generated C headers: sizes and coefficients of one model."""
+"""The generated C headers: sizes and coefficients of one model."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import hashlib
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from romgen.arrays import ComplexArray, FloatArray, IntArray
+from romgen.arrays import ComplexArray
 from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
 from romgen.fmu.programme import MonomialProgramme, fold_conjugates, monomial_programme
 from romgen.fmu.records import PLAIN, InterfaceOptions
-from romgen.polynomial import Scalar
+from romgen.fmu.tables import sensor_programme, table_hash
 from romgen.reduced_model import ReducedModel
 
 HARD_LIMIT = 3.0
@@ -25,18 +24,9 @@ MAX_PRODUCTS = 60000
 
 
 def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) -> str:
-    """The text of coefficients.h: constant data only, decimal numbers that read back exactly."""
-    chart = fold_conjugates(model.chart)
+    """The text of coefficients.h: small constant data only, decimal numbers that read back exactly."""
     form_programme = monomial_programme(model.normal_form.exponents)
-    chart_programme = monomial_programme(chart.exponents)
-    sensor_programme = _sensor_programme(model)
-    chart_dense = _dense(chart_programme, chart.exponents, chart.coefficients)
-    sensors = np.vstack(
-        [
-            _dense(sensor_programme, model.displacement.exponents, model.displacement.coefficients),
-            _dense(sensor_programme, model.velocity.exponents, model.velocity.coefficients),
-        ]
-    )
+    chart_programme = monomial_programme(fold_conjugates(model.chart).exponents)
     return "\n".join(
         [
             f"/* Coefficients of the reduced model {model.name}; generated, data only. */",
@@ -51,20 +41,25 @@ def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) 
             _products("form", form_programme),
             _normal_form(model, form_programme),
             _products("chart", chart_programme),
-            _array("double chart_re[N_REDUCED + N_CHART_PRODUCT][N_REDUCED]", map(_row, chart_dense.real.T)),
-            _array("double chart_im[N_REDUCED + N_CHART_PRODUCT][N_REDUCED]", map(_row, chart_dense.imag.T)),
-            _products("sensor", sensor_programme),
+            _products("sensor", sensor_programme(model)),
             _array("double base_share[N_SENSOR]", map(_real, options.base_share or (0.0,) * len(model.sensors))),
             _array("double sensor_size[2]", map(_real, _sensor_sizes(model))),
-            _array("double sensor_coefficient[N_REDUCED + N_SENSOR_PRODUCT][N_SENSOR_ROW]", map(_row, sensors.T)),
             "#endif",
             "",
         ]
     )
 
 
-def sizes_header(model: ReducedModel, guid: str, coefficients: str, options: InterfaceOptions = PLAIN) -> str:
-    """The text of model_sizes.h: identity and sizes of the model."""
+def tables_header(table: bytes) -> str:
+    """The text of tables.h: the large tables as one array, for units that read no file."""
+    words = np.frombuffer(table, dtype="<f8")
+    text = _array(f"double embedded_table[{len(words)}]", map(_real, words))
+    return "\n".join(["/* The large tables of the reduced model in the order of rom_tables; generated. */", text])
+
+
+def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], options: InterfaceOptions = PLAIN) -> str:
+    """The text of model_sizes.h: identity and sizes of the model; ``data`` is coefficients.h and the large tables."""
+    content_hash = hashlib.sha256(data[0].encode() + data[1]).hexdigest()
     form = monomial_programme(model.normal_form.exponents)
     chart = monomial_programme(fold_conjugates(model.chart).exponents)
     sizes = {
@@ -76,12 +71,14 @@ def sizes_header(model: ReducedModel, guid: str, coefficients: str, options: Int
         "N_FORM_PRODUCT": len(form.products),
         "N_FORM_TERM": int(np.count_nonzero(model.normal_form.coefficients)),
         "N_CHART_PRODUCT": len(chart.products),
-        "N_SENSOR_PRODUCT": len(_sensor_programme(model).products),
+        "N_SENSOR_PRODUCT": len(sensor_programme(model).products),
         "DEFAULT_HARD_LIMIT": _real(HARD_LIMIT),
         "DEFAULT_MAX_INTERNAL_STEP": _real(largest_step(model.eigenvalues)),
         "MODEL_IDENTIFIER": model.name,
         "MODEL_GUID": f'"{guid}"',
-        "MODEL_HASH": f"UINT64_C(0x{hashlib.sha256(coefficients.encode()).hexdigest()[:16]})",
+        "MODEL_HASH": f"UINT64_C(0x{content_hash[:16]})",
+        "COEFFICIENTS_IN_FILE": int(options.coefficients_in_file),
+        "TABLE_HASH": f"UINT64_C(0x{table_hash(data[1]):016x})",
     }
     lines = [f"#define {name} {value}" for name, value in sizes.items()]
     head = f"/* Identity and sizes of the reduced model {model.name}; generated. */"
@@ -93,32 +90,18 @@ def _sensor_sizes(model: ReducedModel) -> tuple[float, float]:
     return float(np.max(nominal_displacement(model))) or 1.0, float(np.max(nominal_velocity(model))) or 1.0
 
 
-def _sensor_programme(model: ReducedModel) -> MonomialProgramme:
-    return monomial_programme(np.vstack([model.displacement.exponents, model.velocity.exponents]))
-
-
-def _dense(programme: MonomialProgramme, exponents: IntArray, coefficients: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
-    """Coefficients over every monomial of the programme, (n_out, n_monomial)."""
-    dense = np.zeros((coefficients.shape[0], programme.n_monomial), dtype=coefficients.dtype)
-    for k, row in enumerate(exponents):
-        dense[:, programme.index[tuple(int(e) for e in row)]] += coefficients[:, k]
-    return dense
-
-
 def _normal_form(model: ReducedModel, programme: MonomialProgramme) -> str:
-    """The nonzero terms of N row by row."""
+    """Which monomials have nonzero terms in N, row by row."""
     position = [programme.index[tuple(int(e) for e in row)] for row in model.normal_form.exponents]
-    starts, terms, values = [0], [], []
+    starts, terms = [0], []
     for row in model.normal_form.coefficients:
         used = np.flatnonzero(row)
         terms += [position[k] for k in used]
-        values += [_complex(row[k]) for k in used]
         starts.append(len(terms))
     return "\n".join(
         [
             _array("unsigned form_row[N_MODE + 1]", map(str, starts)),
             _array("unsigned short form_term[ROM_AT_LEAST_ONE(N_FORM_TERM)]", map(str, terms or [0])),
-            _array("rom_complex form_coefficient[ROM_AT_LEAST_ONE(N_FORM_TERM)]", values or [_complex(0j)]),
         ]
     )
 
@@ -149,10 +132,6 @@ def _array(declaration: str, items: Iterable[str]) -> str:
 def _input_rows(matrix: ComplexArray) -> Sequence[str]:
     rows = ["{" + ", ".join(map(_complex, column)) + "}" for column in matrix.T]
     return rows or ["{" + ", ".join([_complex(0j)] * len(matrix)) + "}"]
-
-
-def _row(values: FloatArray) -> str:
-    return "{" + ", ".join(map(_real, values)) + "}"
 
 
 def _complex(value: complex) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from romgen.fmu.archive import write_archive
 from romgen.fmu.build import build_binaries
-from romgen.fmu.coefficients import coefficients_header, sizes_header
+from romgen.fmu.coefficients import coefficients_header, sizes_header, tables_header
 from romgen.fmu.description import (
     NATIVE_INTERFACES,
     DescriptionText,
@@ -17,9 +17,10 @@ from romgen.fmu.description import (
     tool_name,
 )
 from romgen.fmu.interface import build_interface
-from romgen.fmu.model_file import model_json
+from romgen.fmu.model_file import model_resources
 from romgen.fmu.records import PLAIN, FmuExport, FmuInfo, InterfaceOptions
 from romgen.fmu.selection import exported_model, interface_options
+from romgen.fmu.tables import table_bytes
 from romgen.fmu.templates import licence_files, runtime_sources
 from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
@@ -65,10 +66,12 @@ def export_fmu(
 
 
 def generated_sources(model: ReducedModel, guid: str, options: InterfaceOptions = PLAIN) -> dict[str, bytes]:
-    """All C files of a unit by name: the runtime, the FMI headers and the two generated headers."""
-    coefficients = coefficients_header(model, options)
-    sizes = sizes_header(model, guid, coefficients, options)
+    """All C files of a unit by name: the runtime, the FMI headers and the generated headers."""
+    coefficients, table = coefficients_header(model, options), table_bytes(model)
+    sizes = sizes_header(model, guid, (coefficients, table), options)
     generated = {"coefficients.h": coefficients, "model_sizes.h": sizes}
+    if not options.coefficients_in_file:
+        generated["tables.h"] = tables_header(table)
     return {**runtime_sources(), **{name: text.encode() for name, text in generated.items()}}
 
 
@@ -86,7 +89,7 @@ def _content(
     content = {
         "modelDescription.xml": description.encode(),
         "documentation/index.html": documentation_page(model, interface, text).encode(),
-        "resources/rom.json": model_json(model).encode(),
+        **model_resources(model, in_file=options.coefficients_in_file),
         **licence_files(),
         **{f"sources/{name}": data for name, data in generated_sources(model, guid, options).items()},
     }

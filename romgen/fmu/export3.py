@@ -16,7 +16,7 @@ from romgen.fmu.description import (
 )
 from romgen.fmu.export import generated_sources, silent
 from romgen.fmu.interface import build_interface
-from romgen.fmu.model_file import model_json
+from romgen.fmu.model_file import model_resources
 from romgen.fmu.records import FmuExport, FmuInfo, InterfaceOptions
 from romgen.fmu.selection import exported_model, interface_options
 from romgen.fmu.templates import licence_files, licence_files3, render, runtime_sources3
@@ -109,7 +109,7 @@ def _content(
     content = {
         "modelDescription.xml": _description(model, text, options, (guid, generation_time())).encode(),
         "documentation/index.html": documentation_page(model, build_interface(model, options), text).encode(),
-        "resources/rom.json": model_json(model).encode(),
+        **model_resources(model, in_file=options.coefficients_in_file),
         "sources/buildDescription.xml": render("buildDescription.xml.j2", name=model.name, source_files=files).encode(),
         **licence_files(),
         **licence_files3(),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from romgen.fmu.compilers import host_platform
 from romgen.fmu.driver import Hold, fmpy_problems, replay, unpacked
 from romgen.fmu.kernel_checks import START, kernel_rows
 from romgen.fmu.model_exchange import replay_model_exchange
-from romgen.fmu.model_file import model_from_json
+from romgen.fmu.model_file import model_in_unit
 from romgen.fmu.records import FmuLevels, LevelRow
 from romgen.fmu.rules import rule_problems
 from romgen.fmu.sensor_variables import BASE_MOTION
@@ -55,7 +54,7 @@ def validate_unit(path: Path, report: Report = _silent) -> FmuLevels:
         LevelRow("L0", "rules of FMI 2.0 that are broken", len(broken), 0.0, 0.0),
     ]
     found, notes = (*problems, *broken), [NOT_HERE]
-    model = _model_inside(path)
+    model = model_in_unit(path)
     with unpacked(path) as folder:
         has_binary = (Path(folder) / "binaries" / host_platform()).is_dir()
         if model is not None and has_binary and _is_native(path):
@@ -77,13 +76,6 @@ def _measured(path: Path, model: ReducedModel, report: Report) -> Iterator[Level
     yield from state_rows(path, model, step)
     report(0.8, "L3")
     yield from _input_rows(path, model, step)
-
-
-def _model_inside(path: Path) -> ReducedModel | None:
-    with zipfile.ZipFile(path) as archive:
-        if "resources/rom.json" not in archive.namelist():
-            return None
-        return model_from_json(archive.read("resources/rom.json").decode())
 
 
 def _is_native(path: Path) -> bool:

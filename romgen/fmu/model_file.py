@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import zipfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,26 +12,55 @@ import numpy as np
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.fmu.programme import fold_conjugates
+from romgen.fmu.tables import TABLE_FILE, table_bytes, with_table
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 
+JSON_PATH, TABLE_PATH = "resources/rom.json", f"resources/{TABLE_FILE}"
 FORMAT = "romgen reduced model 1"
+
+
+def model_resources(model: ReducedModel, *, in_file: bool) -> dict[str, bytes]:
+    """Files of a unit that hold its model, by path: rom.json alone, or with the large tables in coefficients.bin."""
+    if not in_file:
+        return {JSON_PATH: model_json(model).encode()}
+    return {JSON_PATH: _text(_content(model, TABLE_FILE)).encode(), TABLE_PATH: table_bytes(model)}
+
+
+def model_in_unit(path: Path) -> ReducedModel | None:
+    """The model that a unit holds, None where it holds none.
+
+    Raises
+    ------
+    InputError : its files are no reduced model.
+    """
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+        if JSON_PATH not in names:
+            return None
+        table = archive.read(TABLE_PATH) if TABLE_PATH in names else None
+        return model_from_json(archive.read(JSON_PATH).decode(), table)
 
 
 def model_json(model: ReducedModel) -> str:
     """All numbers of a model, one key of the top level per line; conjugate terms of the chart are folded into one."""
-    content = {
+    return _text(_content(model))
+
+
+def _content(model: ReducedModel, table: str | None = None) -> dict[str, object]:
+    """The keys of rom.json; ``table`` names the file that holds the large tables instead."""
+    return {
         "format": FORMAT,
         "name": model.name,
         "equations": "z' = Lambda z + N zeta^E + G u; y/s = Re(T zeta^E); x = W (y/s)^E; x' = W_v (y/s)^E; "
         "zeta = (z, conj z)",
         "eigenvalues_per_s": _pairs(model.eigenvalues),
         "normal_form": _map(model.normal_form),
-        "chart": _map(fold_conjugates(model.chart)),
+        "chart": _map(fold_conjugates(model.chart), table),
         "inverse_chart": _map(model.inverse_chart),
         "scale": model.scale.tolist(),
-        "displacement_m": _map(model.displacement),
-        "velocity_m_per_s": _map(model.velocity),
+        "displacement_m": _map(model.displacement, table),
+        "velocity_m_per_s": _map(model.velocity, table),
         "sensors": list(model.sensors),
         "inputs": list(model.inputs),
         "input_units": list(model.input_units),
@@ -37,11 +68,16 @@ def model_json(model: ReducedModel) -> str:
         "internal_resonance": list(model.internal_resonance),
         "trained_amplitude": model.trained_amplitude.tolist(),
     }
+
+
+def _text(content: dict[str, object]) -> str:
     lines = [f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _map(p: PolynomialMap[np.float64] | PolynomialMap[np.complex128]) -> dict[str, object]:
+def _map(p: PolynomialMap[np.float64] | PolynomialMap[np.complex128], table: str | None = None) -> dict[str, object]:
+    if table is not None:
+        return {"exponents": p.exponents.tolist(), "coefficients": table}
     is_complex = np.iscomplexobj(p.coefficients)
     return {
         "exponents": p.exponents.tolist(),
@@ -53,8 +89,13 @@ def _pairs(values: ComplexArray | FloatArray) -> object:
     return np.stack([values.real, values.imag], axis=-1).tolist()
 
 
-def model_from_json(text: str) -> ReducedModel:
+def model_from_json(text: str, table: bytes | None = None) -> ReducedModel:
     """The model that ``model_json`` wrote, exactly; the chart comes folded, which leaves its real part as it was.
+
+    Parameters
+    ----------
+    text : content of rom.json.
+    table : content of coefficients.bin, for a unit that has one.
 
     Raises
     ------
@@ -64,7 +105,12 @@ def model_from_json(text: str) -> ReducedModel:
         content = json.loads(text)
         if content["format"] != FORMAT:
             raise ValueError(f"format is '{content['format']}'")
-        return _model(content)
+        if table is None:
+            return _model(content)
+        for key, zero in (("chart", [0.0, 0.0]), ("displacement_m", 0.0), ("velocity_m_per_s", 0.0)):
+            n_out = 2 * len(content["eigenvalues_per_s"]) if key == "chart" else len(content["sensors"])
+            content[key]["coefficients"] = [[zero] * len(content[key]["exponents"])] * n_out
+        return with_table(_model(content), table)
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise InputError(f"is not a reduced model ({error})", where="rom.json") from error
 

@@ -39,18 +39,20 @@ class FmuInfo:
 
 @dataclass(frozen=True)
 class InterfaceOptions:
-    """What the variables of a unit show beyond the model.
+    """What a unit shows beyond the model, and where it keeps its coefficients.
 
     Attributes
     ----------
     input_range : (minimum, maximum) of each model input in training, SI units, or () where unknown.
     base_share : for absolute outputs, the share of the motion of the base that each exported sensor sees; None without.
     start_from_sensors : start values are displacements and velocities of the sensors instead of the states.
+    coefficients_in_file : the large tables are read from the resources instead of compiled in.
     """
 
     input_range: tuple[tuple[float, float], ...] = ()
     base_share: tuple[float, ...] | None = None
     start_from_sensors: bool = False
+    coefficients_in_file: bool = False
 
 
 PLAIN = InterfaceOptions()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ import romgen
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.fmu.compilers import host_platform
-from romgen.fmu.model_file import model_from_json
+from romgen.fmu.model_file import model_in_unit
 from romgen.fmu.sensor_variables import input_names, sensor_names
 from romgen.fmu.templates import render
 from romgen.reduced_model import ReducedModel
@@ -50,10 +49,9 @@ def write_reference_files(unit: Path, folder: Path, step: float = 1e-5) -> tuple
     ------
     InputError : the unit holds no reduced model.
     """
-    with zipfile.ZipFile(unit) as archive:
-        if "resources/rom.json" not in archive.namelist():
-            raise InputError("holds no reduced model", where=str(unit))
-        model = model_from_json(archive.read("resources/rom.json").decode())
+    model = model_in_unit(unit)
+    if model is None:
+        raise InputError("holds no reduced model", where=str(unit))
     shown = {v.name for v in read_model_description(str(unit), validate=False).modelVariables}
     t: FloatArray = step * np.arange(N_STEP + 1, dtype=np.float64)
     z0 = START * model.trained_amplitude.astype(np.complex128)

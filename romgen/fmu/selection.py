@@ -8,6 +8,7 @@ import re
 import numpy as np
 
 from romgen.errors import InputError
+from romgen.fmu.compilers import requested_platforms
 from romgen.fmu.records import FmuInfo, InterfaceOptions
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
@@ -70,7 +71,13 @@ def interface_options(model: ReducedModel, settings: FmuSettings, info: FmuInfo)
             raise InputError("one share per sensor is needed", where="FmuInfo.base_share", value=given)
         names = model.sensors if settings.sensors is None else settings.sensors
         share = tuple(given[model.sensors.index(name)] for name in names)
-    return InterfaceOptions(info.input_range, share, settings.start == "sensors")
+    return InterfaceOptions(info.input_range, share, settings.start == "sensors", _in_file(settings))
+
+
+def _in_file(settings: FmuSettings) -> bool:
+    """Whether coefficients are read from a file; left open, for several binaries, which then share one copy."""
+    several = len(requested_platforms(settings.platforms)) > 1
+    return settings.coefficients == "file" or (settings.coefficients == "auto" and several)
 
 
 def _check_identifier(name: str) -> None:

@@ -48,6 +48,7 @@ class FmuSettings(Settings):
     step_size: PositiveTime = 1e-4
     absolute: bool = False
     start: Literal["state", "sensors"] = "state"
+    coefficients: Literal["auto", "embedded", "file"] = "auto"
     fmi3: bool = False
     pythonfmu: bool = True
 
