@@ -37,7 +37,7 @@ def from_c(native: FmuExport) -> tuple[float, float, float] | None:
         flags = ["-std=c99", "-O2", f"-I{folder / 'sources'}"]
         subprocess.run([compiler, *flags, str(TIMING), "-o", str(program), "-ldl"], check=True)
         library = next((folder / "binaries" / host_platform()).iterdir())
-        command = [str(program), str(library), str(N_C)]
+        command = [str(program), str(library), str(N_C), (folder / "resources").as_uri()]
         runs = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(REPEATS)]
     instantiate, step, whole = (min(column) for column in zip(*(map(float, run.split()) for run in runs), strict=True))
     return instantiate, step, whole

@@ -1,5 +1,5 @@
 /* Times an exported library from plain C: instantiate and free; a step; set input, step, read the displacements.
-   Usage: fmu_timing LIBRARY N. Prints the three in microseconds. */
+   Usage: fmu_timing LIBRARY N RESOURCES. Prints the three in microseconds. */
 #define _POSIX_C_SOURCE 199309L
 #include <dlfcn.h>
 #include <stdio.h>
@@ -27,7 +27,7 @@ static void quiet(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2St
 
 int main(int argc, char **argv)
 {
-    if (argc != 3)
+    if (argc != 4)
         return 2;
     void *library = dlopen(argv[1], RTLD_NOW);
     if (library == NULL)
@@ -53,10 +53,10 @@ int main(int argc, char **argv)
     const int n = atoi(argv[2]), n_instance = 1000;
     double start = now_us();
     for (int k = 0; k < n_instance; ++k)
-        release(instantiate("a", fmi2CoSimulation, MODEL_GUID, "", &callbacks, 0, 0));
+        release(instantiate("a", fmi2CoSimulation, MODEL_GUID, argv[3], &callbacks, 0, 0));
     const double instantiate_us = (now_us() - start) / n_instance;
 
-    fmi2Component c = instantiate("a", fmi2CoSimulation, MODEL_GUID, "", &callbacks, 0, 0);
+    fmi2Component c = instantiate("a", fmi2CoSimulation, MODEL_GUID, argv[3], &callbacks, 0, 0);
     const fmi2ValueReference state = 0, input = FIRST_INPUT;
     fmi2ValueReference sensors[N_SENSOR];
     double values[N_SENSOR], z = 0.5, u;

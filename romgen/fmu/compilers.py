@@ -26,6 +26,9 @@ TARGETS: dict[str, tuple[str, ...]] = {
 FLAGS = ("-std=c99", "-Os", "-s", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 """No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
 
+FAST_FILES = ("rom_kernel.c", "rom_etdrk4.c")
+"""Files in which steps spend their time are compiled for speed, the others for size."""
+
 NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 """Nothing is thrown through the runtime; Windows keeps the tables, which its debuggers walk the stack by."""
 
@@ -112,9 +115,16 @@ def compile_library(compiler: Compiler, target: str | None, sources: Path, outpu
     if target and "windows" in target:
         _compile_for_windows(compiler, target, sources, output, files)
         return
-    target_flags = ["-target", target] if target else []
-    command = [*compiler.command, *target_flags, *FLAGS, *NO_UNWIND_TABLES, "-o", str(output), *files, "-lm"]
-    _run(compiler, target, command, sources)
+    start = [*compiler.command, *(["-target", target] if target else []), *FLAGS, *NO_UNWIND_TABLES]
+    fast = [name for name in files if name in FAST_FILES]
+    objects = [f"{Path(name).stem}.o" for name in fast]
+    for name, compiled in zip(fast, objects, strict=True):
+        flags = [flag for flag in start if flag not in {"-shared", "-s"}]
+        _run(compiler, target, [*flags, *_fast(name), "-c", name, "-o", compiled], sources)
+    others = [name for name in files if name not in FAST_FILES]
+    _run(compiler, target, [*start, "-o", str(output), *others, *objects, "-lm"], sources)
+    for name in objects:
+        (sources / name).unlink()
 
 
 def _compile_for_windows(compiler: Compiler, target: str, sources: Path, output: Path, files: list[str]) -> None:
@@ -124,7 +134,7 @@ def _compile_for_windows(compiler: Compiler, target: str, sources: Path, output:
     compile_flags = ["-target", target, *(flag for flag in FLAGS if flag not in {"-shared", "-s"})]
     objects = [f"{Path(name).stem}.obj" for name in (*files, "dll_entry.c")]
     for name, compiled in zip((*files, "dll_entry.c"), objects, strict=True):
-        _run(compiler, target, [*compiler.command, *compile_flags, "-c", name, "-o", compiled], sources)
+        _run(compiler, target, [*compiler.command, *compile_flags, *_fast(name), "-c", name, "-o", compiled], sources)
     tool = ["dlltool", "-m", "i386:x86-64", "-d", "msvcrt.def", "-l", "msvcrt.lib"]
     _run(compiler, target, [*compiler.command[:-1], *tool], sources)
     link = ["-target", target, "-shared", "-s", "-nostdlib", "-o", str(output), *objects, "msvcrt.lib"]
@@ -133,6 +143,11 @@ def _compile_for_windows(compiler: Compiler, target: str, sources: Path, output:
     library.write_bytes(without_time(library.read_bytes()))
     for name in ("dll_entry.c", "msvcrt.def", "msvcrt.lib", *objects):
         (sources / name).unlink(missing_ok=True)
+
+
+def _fast(name: str) -> list[str]:
+    """The flag that replaces -Os, the last one counts."""
+    return ["-O2"] if name in FAST_FILES else []
 
 
 def without_time(library: bytes) -> bytes:

@@ -112,7 +112,7 @@ static void sequence(void)
 {
     const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, NULL};
     subject s = {NULL, NULL, {0}, 0, 0.0};
-    s.c = Instantiate("fuzz", below(2) ? fmi2CoSimulation : fmi2ModelExchange, MODEL_GUID, "", &callbacks, 0, 0);
+    s.c = Instantiate("fuzz", below(2) ? fmi2CoSimulation : fmi2ModelExchange, MODEL_GUID, resources, &callbacks, 0, 0);
     CHECK(s.c != NULL);
     if (below(4)) { /* most sequences start properly, so that they get somewhere */
         CHECK(SetupExperiment(s.c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK);

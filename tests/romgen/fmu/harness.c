@@ -20,7 +20,7 @@ static fmi2ValueReference all_reals[N_REAL], states[N_STATE], inputs[N_INPUT + 1
 
 static fmi2Component instance(fmi2Type type)
 {
-    fmi2Component c = Instantiate("100% one", type, MODEL_GUID, "file:///none", &callbacks, fmi2False, fmi2False);
+    fmi2Component c = Instantiate("100% one", type, MODEL_GUID, resources, &callbacks, fmi2False, fmi2False);
     CHECK(c != NULL);
     return c;
 }
@@ -174,10 +174,10 @@ static void misuse_is_refused(void)
     fmi2FMUstate nothing = NULL;
     const fmi2ValueReference far = N_REAL, sensor = FIRST_SENSOR, zero = 0, one_boolean = 1;
     const fmi2String category = "noSuchCategory";
-    CHECK(Instantiate("a", fmi2CoSimulation, "{wrong}", "", &callbacks, fmi2False, fmi2False) == NULL);
-    CHECK(Instantiate("", fmi2CoSimulation, MODEL_GUID, "", &callbacks, fmi2False, fmi2False) == NULL);
-    CHECK(Instantiate("a", fmi2CoSimulation, NULL, "", &callbacks, fmi2False, fmi2False) == NULL);
-    CHECK(Instantiate("a", fmi2CoSimulation, MODEL_GUID, "", NULL, fmi2False, fmi2False) == NULL);
+    CHECK(Instantiate("a", fmi2CoSimulation, "{wrong}", resources, &callbacks, fmi2False, fmi2False) == NULL);
+    CHECK(Instantiate("", fmi2CoSimulation, MODEL_GUID, resources, &callbacks, fmi2False, fmi2False) == NULL);
+    CHECK(Instantiate("a", fmi2CoSimulation, NULL, resources, &callbacks, fmi2False, fmi2False) == NULL);
+    CHECK(Instantiate("a", fmi2CoSimulation, MODEL_GUID, resources, NULL, fmi2False, fmi2False) == NULL);
     fmi2Component c = instance(fmi2CoSimulation);
     CHECK(GetReal(c, &zero, 1, values) == fmi2Error);
     CHECK(DoStep(c, 0.0, H, fmi2True) == fmi2Error);

@@ -41,6 +41,7 @@
 ALL_FUNCTIONS(DECLARE)
 
 static int n_function;
+static const char *resources = ""; /* location of the resources, from FMU_RESOURCES; not every unit has one */
 
 #define LOAD(name)                                            \
     *(void **)(&name) = dlsym(library, "fmi2" #name);         \
@@ -54,6 +55,8 @@ static void load(const char *path)
     CHECK(library != NULL);
     ALL_FUNCTIONS(LOAD)
     CHECK(n_function == 44);
+    if (getenv("FMU_RESOURCES") != NULL)
+        resources = getenv("FMU_RESOURCES");
 }
 
 #endif

@@ -53,7 +53,8 @@ int main(int argc, char **argv)
     *(void **)(&slope) = FIND("fmi2SetRealInputDerivatives");
     *(void **)(&step) = FIND("fmi2DoStep");
     const fmi2CallbackFunctions callbacks = {quiet, NULL, NULL, NULL, NULL};
-    fmi2Component c = instantiate("a", fmi2CoSimulation, MODEL_GUID, "", &callbacks, 0, 0);
+    const char *location = getenv("FMU_RESOURCES") != NULL ? getenv("FMU_RESOURCES") : "";
+    fmi2Component c = instantiate("a", fmi2CoSimulation, MODEL_GUID, location, &callbacks, 0, 0);
     fmi2ValueReference rows[N_ROW];
     const fmi2ValueReference input = 2 * N_STATE;
     const fmi2Integer first = 1;
