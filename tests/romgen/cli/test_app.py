@@ -8,12 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from fmpy import read_model_description
 from typer.testing import CliRunner, Result
 
 import romgen
 from romgen.cli import run as run_command
 from romgen.cli.app import app
 from romgen.errors import NumericalError
+from romgen.settings import load_study
 from tests.lab_study import write_lab_study
 
 ROOT = Path(__file__).parents[3]
@@ -135,6 +137,18 @@ def test_a_study_from_start_to_end(tmp_path: Path) -> None:
     assert "validation" in learned.stdout
     exported = romgen_cli("export", study, "--run-dir", folder, "--json")
     assert json.loads(exported.stdout)["path"] == "lab.fmu"
+    sensor = load_study(study).sensor_names[0]
+    chosen = romgen_cli("export", study, "--run-dir", folder, "--backend", "c", "--sensors", sensor)
+    assert chosen.exit_code == 0, chosen.stderr
+    assert "pythonfmu" not in chosen.stdout
+    names = {v.name for v in read_model_description(str(folder / "lab.fmu")).modelVariables if v.causality == "output"}
+    assert {name for name in names if name.endswith("_displacement")} == {f"{sensor}_displacement"}
+    both = romgen_cli("export", study, "--run-dir", folder, "--backend", "python")
+    assert "lab_pythonfmu.fmu" in both.stdout
+    assert (folder / "lab_pythonfmu.fmu").exists()
+    wrong = romgen_cli("export", study, "--run-dir", folder, "--sensors", "nowhere")
+    assert wrong.exit_code == 2
+    assert "--sensors: unknown sensor" in wrong.stderr
     validated = romgen_cli("validate", study, "--run-dir", folder)
     assert validated.exit_code == 0, validated.stderr
     ran = romgen_cli("run", study, "--run-dir", folder)

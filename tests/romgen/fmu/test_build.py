@@ -74,7 +74,7 @@ def test_exactly_the_44_functions_are_exported(run_cc: Callable[..., None], tmp_
 
 
 def test_no_console_output_globals_or_memory_in_steps() -> None:
-    """Words that must not occur in the runtime; calloc only where instances and snapshots are made, files only there."""
+    """Words that must not occur in the runtime; calloc and files only where instances and snapshots are made."""
     sources = {k: v.decode() for k, v in generated_sources(random_model(2), "").items() if not k.startswith("fmi2T")}
     runtime = {k: v for k, v in sources.items() if k.startswith(("rom_", "fmi2_"))}
     for word in ("printf(", "setlocale", "malloc(", "realloc("):
