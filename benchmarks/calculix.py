@@ -238,6 +238,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=10, help="time steps, at least 2")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds after which a run of ccx is stopped")
     arguments = parser.parse_args()
+    if arguments.steps < 2:
+        parser.error("--steps: at least 2, the first one is not timed")
     if shutil.which("ccx") is None:
         sys.exit("CalculiX (ccx) is not installed; on Debian and Ubuntu: apt install calculix-ccx")
     for name in arguments.meshes:
