@@ -10,6 +10,7 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -34,22 +35,28 @@ def test_the_windows_library_computes_the_same_motion(run_cc: Callable[..., None
     if wine is None or importlib.util.find_spec("ziglang") is None:
         pytest.skip("wine or ziglang is not installed")
     export_fmu(random_model(7), tmp_path / "x.fmu", FmuSettings(platforms=("linux64", "win64")))
+    folder = tmp_path / "a b ü"
     with zipfile.ZipFile(tmp_path / "x.fmu") as archive:
-        archive.extractall(tmp_path)
-    run_cc("-std=c99", "-O1", "-Isources", SOURCE, "-o", "trajectory", "-ldl", "-lm", folder=tmp_path)
+        archive.extractall(folder)
+    run_cc("-std=c99", "-O1", "-Isources", SOURCE, "-o", "trajectory", "-ldl", "-lm", folder=folder)
     caches = {
         "ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "global"),
         "ZIG_LOCAL_CACHE_DIR": str(cache_folder() / "local"),
     }
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-Isources"]
-    subprocess.run([*zig, str(SOURCE), "-o", "t.exe"], cwd=tmp_path, env={**os.environ, **caches}, check=True)
+    subprocess.run([*zig, str(SOURCE), "-o", "t.exe"], cwd=folder, env={**os.environ, **caches}, check=True)
     steps = str(N_STEP)
     linux = ["./trajectory", "./binaries/linux64/random_panel.so", steps]
     windows = [wine, "t.exe", "binaries/win64/random_panel.dll", steps]
     quiet = {**os.environ, "WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
+    places = ((linux, (folder / "resources").as_uri()), (windows, f"file:///Z:{quote(str(folder))}/resources"))
     a, b = (
-        numbers(subprocess.run(c, cwd=tmp_path, env=quiet, capture_output=True, text=True, check=True).stdout)
-        for c in (linux, windows)
+        numbers(
+            subprocess.run(
+                c, cwd=folder, env={**quiet, "FMU_RESOURCES": place}, capture_output=True, text=True, check=True
+            ).stdout
+        )
+        for c, place in places
     )
     assert a.shape == (N_STEP, 4 + 6)
     assert np.max(np.abs(a - b) / np.max(np.abs(a), axis=0)) <= 1e-12
