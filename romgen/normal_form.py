@@ -15,7 +15,7 @@ from romgen.errors import NumericalError
 from romgen.polynomial import PolynomialMap, evaluate, exponents, monomials, zeta
 from romgen.reduced_dynamics import ReducedDynamics, fit_reduced_dynamics, modal_samples
 from romgen.regression import ridge_fit
-from romgen.resonance import ResonanceTable, automatic_resonance, integer_resonance, trivial_resonance
+from romgen.resonance import ResonanceTable, automatic_resonance, gap_resonance, integer_resonance, trivial_resonance
 from romgen.substitution import substitute_linear
 
 # Rows used by the conjugacy fit: a few thousand phases and amplitudes determine all coefficients.
@@ -23,7 +23,7 @@ FIT_SAMPLES = 4000
 # Terms above degree 3 take a ridge 10^degree times stronger: few motions leave them free between their amplitudes.
 FREE_DEGREE, GRADE = 3, 10.0
 
-Resonance = tuple[int, ...] | Literal["auto"]
+Resonance = tuple[int, ...] | Literal["auto", "gap"]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def fit_normal_form(
     ----------
     training : trajectories in reduced coordinates.
     order : f, largest degree.
-    internal_resonance : integers r_j, () for none, or "auto".
+    internal_resonance : integers r_j, () for none, "auto" (integers) or "gap" (by size).
     ridge : of every regression and of A and B.
 
     Raises
@@ -90,10 +90,12 @@ def fit_normal_form(
 
 
 def resonance_table(eigenvalues: ComplexArray, order: int, internal_resonance: Resonance) -> ResonanceTable:
-    """Return the terms of degree 2..order to keep; "auto" finds the integers, () keeps products with abs(z)^2 only."""
+    """Return the terms of degree 2..order to keep; "auto" finds the integers, "gap" a tolerance, () is none."""
     table = exponents(2 * len(eigenvalues), 2, order)
     if internal_resonance == "auto":
         return automatic_resonance(eigenvalues, table)
+    if internal_resonance == "gap":
+        return gap_resonance(eigenvalues, table)
     if internal_resonance == ():
         return trivial_resonance(eigenvalues, table)
     return integer_resonance(eigenvalues, table, internal_resonance)

@@ -84,12 +84,8 @@ def automatic_resonance(eigenvalues: ComplexArray, exponents: IntArray) -> Reson
     any other by the tolerance in the middle of the gap.
     """
     low = exponents[exponents.sum(axis=1) <= GAP_ORDER]
-    detuning = _detuning(eigenvalues, low)
-    steps = np.unique(np.round(detuning[detuning <= eigenvalues.imag.min()], decimals=9))
-    widest = int(np.diff(steps).argmax())
-    below, above = float(steps[widest]), float(steps[widest + 1])
-    kept = detuning <= 0.5 * (below + above)
-    gap = f"detunings up to {below:.4g} rad/s lie below the widest gap, the next is {above:.4g} rad/s"
+    below, above, gap = _widest_gap(eigenvalues, low)
+    kept = _detuning(eigenvalues, low) <= 0.5 * (below + above)
     for table in _named_tables(eigenvalues, low):
         if np.array_equal(table.resonant, kept):
             full = (
@@ -99,6 +95,33 @@ def automatic_resonance(eigenvalues: ComplexArray, exponents: IntArray) -> Reson
             )
             return replace(full, reason=f"{full.reason}; {gap}")
     return replace(tolerance_resonance(eigenvalues, exponents, 0.5 * (below + above)), reason=gap)
+
+
+def gap_resonance(eigenvalues: ComplexArray, exponents: IntArray) -> ResonanceTable:
+    """Keep abs(lambda_j - <m, lambda>) < tolerance at every degree, tolerance from the widest gap.
+
+    The tolerance is the geometric mean of the edges of the gap (half the upper edge where the lower is zero): a
+    product that is detuned twice as far as the resonance itself then counts as non-resonant, unlike in
+    ``automatic_resonance``. The integers are those that all kept terms satisfy, () where there are none.
+    """
+    below, above, gap = _widest_gap(eigenvalues, exponents[exponents.sum(axis=1) <= GAP_ORDER])
+    tolerance = float(np.sqrt(below * above)) if below > 0.0 else 0.5 * above
+    table = tolerance_resonance(eigenvalues, exponents, tolerance)
+    integers: tuple[int, ...] = ()
+    for named in _named_tables(eigenvalues, exponents):
+        if not np.any(table.resonant & ~named.resonant):
+            integers = named.internal_resonance
+            break
+    return replace(table, internal_resonance=integers, reason=f"{table.reason}; {gap}")
+
+
+def _widest_gap(eigenvalues: ComplexArray, low: IntArray) -> tuple[float, float, str]:
+    """Return the edges in rad/s of the widest gap of the frequency detunings of ``low``, and a sentence."""
+    detuning = _detuning(eigenvalues, low)
+    steps = np.unique(np.round(detuning[detuning <= eigenvalues.imag.min()], decimals=9))
+    widest = int(np.diff(steps).argmax())
+    below, above = float(steps[widest]), float(steps[widest + 1])
+    return below, above, f"detunings up to {below:.4g} rad/s lie below the widest gap, the next is {above:.4g} rad/s"
 
 
 def _named_tables(eigenvalues: ComplexArray, exponents: IntArray) -> Iterator[ResonanceTable]:

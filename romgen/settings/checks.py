@@ -190,7 +190,7 @@ def _learn_problems(study: Study) -> Iterator[str]:
     if len(set(learn.master_modes)) < len(learn.master_modes) or not learn.master_modes:
         yield f"[learn] master_modes must differ and not be empty; got {list(learn.master_modes)}"
     resonance = learn.internal_resonance
-    if resonance not in ("auto", ()) and len(resonance) != len(learn.master_modes):
+    if resonance not in ("auto", "gap", ()) and len(resonance) != len(learn.master_modes):
         yield f"[learn] internal_resonance needs one integer per master mode; got {list(resonance)}"
     if isinstance(learn.order, int) and not 1 <= learn.order <= 9:
         yield f"[learn] order must be 1 to 9 or 'auto'; got {learn.order}"

@@ -13,7 +13,7 @@ class LearnSettings(Settings):
     """Table [learn]: the manifold and its normal form."""
 
     master_modes: tuple[int, ...] = (1, 2)
-    internal_resonance: tuple[int, ...] | Literal["auto"] = "auto"
+    internal_resonance: tuple[int, ...] | Literal["auto", "gap"] = "auto"
     order: int | Literal["auto"] = "auto"
     geometry_order: int | None = Field(default=None, ge=1, le=9)
     ridge: float = Field(default=1e-8, ge=0.0)
