@@ -48,19 +48,35 @@ def fit_reduced_dynamics(training: Sequence[ReducedTrajectory], order: int, ridg
 
     Raises
     ------
-    NumericalError : the linear part has not m decaying oscillations.
+    NumericalError : fewer samples than terms, or the linear part has not m decaying oscillations.
     """
     y, y_dot = np.vstack([r.y for r in training]), np.vstack([r.y_dot for r in training])
     m = y.shape[1] // 2
     scale = np.abs(y).max(axis=0)
     table = exponents(2 * m, 1, order)
+    phi = monomials(y / scale, table)
+    _check_enough(phi, order)
     R = np.zeros((2 * m, len(table)))
     R[np.arange(m), m + np.arange(m)] = scale[m:] / scale[:m]
-    R[m:] = ridge_fit(monomials(y / scale, table), y_dot[:, m:] / scale[m:], ridge)
+    R[m:] = ridge_fit(phi, y_dot[:, m:] / scale[m:], ridge)
     eigenvalues, V = decaying_modes(R[:, : 2 * m])
     amplitude = np.abs((y / scale) @ np.linalg.inv(V).T).max(axis=0)
     V = V * (amplitude / LARGEST_AMPLITUDE)
     return ReducedDynamics(scale, PolynomialMap(table, R), eigenvalues, V[:, :m], np.linalg.inv(V)[:m])
+
+
+def _check_enough(phi: FloatArray, order: int) -> None:
+    """Refuse fewer samples than terms; the condition number is that of the monomials scaled to RMS 1."""
+    n_sample, n_term = phi.shape
+    if n_sample >= n_term:
+        return
+    singular = np.linalg.svd(phi / np.sqrt(np.mean(phi**2, axis=0)), compute_uv=False)
+    raise NumericalError(
+        f"too little data for order {order}: {n_sample} samples for {n_term} terms",
+        where="reduced dynamics",
+        value=f"condition number {singular[0] / max(singular[-1], np.finfo(float).tiny):.2g}",
+        advice="lower [learn] order, start_time, or give more training data",
+    )
 
 
 def decaying_modes(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:

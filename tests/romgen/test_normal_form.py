@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from romgen.arrays import ComplexArray
+from romgen.chart import ReducedTrajectory
 from romgen.conjugacy_residual import ConjugacyProblem, linearise, residual, solve_step
 from romgen.differences import first_derivative, resample, second_derivative
 from romgen.errors import NumericalError
 from romgen.manifold import ManifoldFit, lift, nmte_blocks
 from romgen.metrics import analytic_signal, instantaneous, nmte_percent
 from romgen.polynomial import PolynomialMap, evaluate, exponents
-from romgen.reduced_dynamics import decaying_modes
+from romgen.reduced_dynamics import decaying_modes, fit_reduced_dynamics
 from romgen.resonance import automatic_resonance, integer_resonance, tolerance_resonance
 from romgen.substitution import substitute_linear
 from romgen.variational import sensitivities
@@ -144,6 +145,15 @@ def test_sensitivities_match_finite_differences() -> None:
 def test_growing_modes_are_refused() -> None:
     with pytest.raises(NumericalError, match="not that of decaying oscillations"):
         decaying_modes(np.array([[0.0, 1.0], [-4.0, 0.1]]))
+
+
+def test_too_few_samples_for_the_order_are_refused() -> None:
+    rng = np.random.default_rng(5)
+    y = rng.normal(size=(30, 4))
+    few = ReducedTrajectory("few", np.arange(30.0), y, y, y[:, :1], y[:, :1])
+    # 125 monomials of degree 1 to 5 in four variables: binomial(9, 4) - 1
+    with pytest.raises(NumericalError, match=r"order 5: 30 samples for 125 terms; got condition number"):
+        fit_reduced_dynamics([few], 5, 1e-8)
 
 
 def test_streamed_manifold_recovers_a_polynomial_from_blocks() -> None:

@@ -15,6 +15,7 @@ import romgen
 from romgen.cli import run as run_command
 from romgen.cli.app import app
 from romgen.errors import NumericalError
+from romgen.fmu.model_file import model_from_json, model_json
 from romgen.settings import load_study
 from tests.lab_study import write_lab_study
 
@@ -132,9 +133,11 @@ def test_python_m_romgen_has_no_trace_and_no_colour(tmp_path: Path) -> None:
 
 def test_a_study_from_start_to_end(tmp_path: Path) -> None:
     study, folder = write_lab_study(tmp_path), tmp_path / "run folder ü"
-    learned = romgen_cli("learn", study, "--run-dir", folder)
+    learned = romgen_cli("learn", study, "--run-dir", folder, "--model-json", tmp_path / "model.json")
     assert learned.exit_code == 0, learned.stderr
     assert "validation" in learned.stdout
+    text = (tmp_path / "model.json").read_text(encoding="utf-8")
+    assert model_json(model_from_json(text)) == text
     exported = romgen_cli("export", study, "--run-dir", folder, "--json")
     assert json.loads(exported.stdout)["path"] == "lab.fmu"
     sensor = load_study(study).sensor_names[0]
