@@ -123,7 +123,7 @@ def test_order_of_a_model_study(checked: bool) -> None:
 @pytest.mark.skipif(not TRC_DATA.is_file(), reason=f"reference data {TRC_DATA} is not there")
 def test_published_ringdowns(tmp_path: Path) -> None:
     text = (ROOT / "models" / "external_ringdown" / "study.toml").read_text(encoding="utf-8")
-    text = text.replace('order = "auto"', "order = 3")  # choosing the order takes half a minute
+    text = text.replace('order = "auto"', "order = 5")  # choosing the order takes another minute
     (tmp_path / "study.toml").write_text(text.replace('"ringdowns.mat"', json.dumps(str(TRC_DATA))), encoding="utf-8")
     result = run(load_study(tmp_path / "study.toml"), tmp_path / "run", until="validation")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -132,7 +132,7 @@ def test_published_ringdowns(tmp_path: Path) -> None:
     assert eigenvalues.imag / (2 * np.pi) == pytest.approx([110.47, 197.4], rel=0.01)
     assert list(result.infos) == ["data", "learn", "backbone", "fmu", "validation"]
     [(name, error)] = summary["learn"]["nmte_percent"]["validation"].items()
-    # measured 11.2 % with the direct fit of order 3; a broken chain (sensors, units, start states) gives 50 % and more
-    assert error < 15.0, name
+    # measured 3.6 %; target for a start inside the span of the others 5 %; published model 9.16 % on unseen data
+    assert error < 5.0, name
     assert summary["fmu"]["fmpy_problems"] == 0
     assert summary["fmu"]["native_vs_python_rel"] < 1e-9
