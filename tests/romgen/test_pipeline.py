@@ -128,7 +128,7 @@ def test_published_ringdowns(tmp_path: Path) -> None:
     result = run(load_study(tmp_path / "study.toml"), tmp_path / "run", until="validation")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     eigenvalues = np.array(summary["learn"]["eigenvalues_per_s"]) @ [1.0, 1j]
-    # the tails of the two training motions say 110.9 to 111.2 and 198.1 to 198.8 Hz (published model: 110.47, 196.10 Hz)
+    # the tails of the data say 110.9 to 111.2 and 198.1 to 198.8 Hz (published model: 110.47, 196.10 Hz)
     assert eigenvalues.imag / (2 * np.pi) == pytest.approx([111.0, 198.5], rel=0.01)
     assert list(result.infos) == ["data", "learn", "backbone", "fmu", "validation"]
     [(name, error)] = summary["learn"]["nmte_percent"]["validation"].items()
