@@ -6,8 +6,8 @@ import ast
 import hashlib
 from collections.abc import Iterator
 from functools import cache
-from importlib.resources import files
-from importlib.resources.abc import Traversable
+from importlib.util import find_spec
+from pathlib import Path
 
 PACKAGES = ("romgen", "fem", "fmu_templates")
 
@@ -39,10 +39,18 @@ def _source(name: str) -> bytes | None:
     if package not in PACKAGES:
         return None
     if name == "fmu_templates":
-        return b"\0".join(path.encode() + b"\0" + data for path, data in _files(files(name), name))
-    path = files(package).joinpath(*inner)
-    source = path / "__init__.py" if path.is_dir() else files(package).joinpath(*inner[:-1], f"{inner[-1]}.py")
+        return b"\0".join(path.encode() + b"\0" + data for path, data in _files(_root(name), name))
+    path = _root(package).joinpath(*inner)
+    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     return source.read_bytes() if source.is_file() else None
+
+
+def _root(package: str) -> Path:
+    """Folder of a package, which is not imported: its libraries may be missing."""
+    spec = find_spec(package)
+    assert spec is not None
+    assert spec.submodule_search_locations is not None
+    return Path(next(iter(spec.submodule_search_locations)))
 
 
 @cache
@@ -64,7 +72,7 @@ def _imports(name: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _files(folder: Traversable, path: str) -> Iterator[tuple[str, bytes]]:
+def _files(folder: Path, path: str) -> Iterator[tuple[str, bytes]]:
     for entry in sorted(folder.iterdir(), key=lambda item: item.name):
         if entry.is_dir() and entry.name != "__pycache__":
             yield from _files(entry, f"{path}/{entry.name}")

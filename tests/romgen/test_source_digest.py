@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from romgen import source_digest as module
@@ -44,3 +47,12 @@ def test_a_stage_depends_on_what_it_imports(stages: str, changed: str, matters: 
 
 def test_foreign_code_counts_as_nothing() -> None:
     assert source_digest("json") == source_digest("tests.nowhere")
+
+
+def test_nothing_is_imported_to_be_read() -> None:
+    """A study from data runs where the libraries of the finite-element half are missing."""
+    code = (
+        "import sys; sys.modules['skfem'] = None; from romgen.source_digest import source_digest; "
+        "source_digest('romgen.model_stages'); assert 'fem' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
