@@ -70,7 +70,7 @@ def element_forces(
                 _add_divergence(P, gradients[e, q], fe)
                 if beta > 0.0:
                     _gradient(ve, gradients[e, q], D)
-                    _viscous_stress(F, D, beta * lam, beta * mu, Sv)
+                    viscous_stress(F, D, beta * lam, beta * mu, Sv)
                     _product(F, Sv, w, Q)
                     _add_divergence(Q, gradients[e, q], ge)
             energies[e, c] = energy
@@ -114,7 +114,7 @@ def _add_divergence(P: FloatArray, gradients: FloatArray, fe: FloatArray) -> Non
 
 
 @inlined
-def _viscous_stress(F: FloatArray, D: FloatArray, lam: float, mu: float, S: FloatArray) -> None:
+def viscous_stress(F: FloatArray, D: FloatArray, lam: float, mu: float, S: FloatArray) -> None:
     """S <- lam tr(E') I + 2 mu E' with E' = (F'D + D'F)/2 and D the gradient of the velocity."""
     trace = 0.0
     for i in range(3):
@@ -202,26 +202,59 @@ def element_tangents(
                         s += u[3 * cells[e, a] + i] * gradients[e, q, j, a]
                     F[i, j] = s
             _stress(F, lam, mu, initial, e, S)
+            push_forward(F, gradients[e, q], Fg)
+            push_forward(S, gradients[e, q], Sg)
+            outer(F, F, B)
+            add_tangent(w, lam, mu, geometric_share, gradients[e, q], Sg, Fg, Fg, B, tangents[e])
+
+
+@inlined
+def push_forward(F: FloatArray, gradients: FloatArray, out: FloatArray) -> None:
+    """F g_a of all shape gradients, (n_local, 3)."""
+    for a in range(out.shape[0]):
+        for i in range(3):
+            out[a, i] = F[i, 0] * gradients[0, a] + F[i, 1] * gradients[1, a] + F[i, 2] * gradients[2, a]
+
+
+@inlined
+def outer(F: FloatArray, X: FloatArray, out: FloatArray) -> None:
+    """F X' of two 3 by 3 matrices."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = F[i, 0] * X[j, 0] + F[i, 1] * X[j, 1] + F[i, 2] * X[j, 2]
+
+
+@inlined
+def add_tangent(
+    w: float,
+    lam: float,
+    mu: float,
+    geometric_share: float,
+    gradients: FloatArray,
+    Sg: FloatArray,
+    Fg: FloatArray,
+    Xg: FloatArray,
+    FX: FloatArray,
+    out: FloatArray,
+) -> None:
+    """K_ab += w [share (g_a.S g_b) I + lambda Fg_a (Xg_b)' + mu Fg_b (Xg_a)' + mu (g_a.g_b) F X'].
+
+    X = F gives the elastic tangent, X = grad v that of the viscous force; gradients (3, n_local), Sg, Fg, Xg
+    (n_local, 3), FX (3, 3), out (n_local, n_local, 3, 3).
+    """
+    for a in range(Fg.shape[0]):
+        for b in range(Fg.shape[0]):
+            geometric = 0.0
+            product = 0.0
             for i in range(3):
+                geometric += gradients[i, b] * Sg[a, i]
+                product += gradients[i, a] * gradients[i, b]
+            for i in range(3):
+                out[a, b, i, i] += geometric_share * w * geometric
                 for j in range(3):
-                    B[i, j] = F[i, 0] * F[j, 0] + F[i, 1] * F[j, 1] + F[i, 2] * F[j, 2]
-                for a in range(n_local):
-                    g0, g1, g2 = gradients[e, q, 0, a], gradients[e, q, 1, a], gradients[e, q, 2, a]
-                    Fg[a, i] = F[i, 0] * g0 + F[i, 1] * g1 + F[i, 2] * g2
-                    Sg[a, i] = S[i, 0] * g0 + S[i, 1] * g1 + S[i, 2] * g2
-            for a in range(n_local):
-                for b in range(n_local):
-                    geometric = 0.0
-                    product = 0.0
-                    for i in range(3):
-                        geometric += gradients[e, q, i, b] * Sg[a, i]
-                        product += gradients[e, q, i, a] * gradients[e, q, i, b]
-                    for i in range(3):
-                        tangents[e, a, b, i, i] += geometric_share * w * geometric
-                        for j in range(3):
-                            tangents[e, a, b, i, j] += w * (
-                                lam * Fg[a, i] * Fg[b, j] + mu * Fg[b, i] * Fg[a, j] + mu * product * B[i, j]
-                            )
+                    out[a, b, i, j] += w * (
+                        lam * Fg[a, i] * Xg[b, j] + mu * Fg[b, i] * Xg[a, j] + mu * product * FX[i, j]
+                    )
 
 
 @compiled

@@ -8,6 +8,7 @@ from numba import prange
 
 from fem.arrays import FloatArray, IntArray
 from fem.compiled import inlined, threaded
+from fem.kernel import add_tangent, outer, push_forward, viscous_stress
 from fem.model import Model
 
 
@@ -39,26 +40,12 @@ def viscous_tangents(
         for q in range(n_point):
             w = weights[e, q]
             _fields(u, v, cells[e], gradients[e, q], F, D)
-            _stress(F, D, lam, mu, S, FD)
-            for i in range(3):
-                for a in range(n_local):
-                    g0, g1, g2 = gradients[e, q, 0, a], gradients[e, q, 1, a], gradients[e, q, 2, a]
-                    Fg[a, i] = F[i, 0] * g0 + F[i, 1] * g1 + F[i, 2] * g2
-                    Dg[a, i] = D[i, 0] * g0 + D[i, 1] * g1 + D[i, 2] * g2
-                    Sg[a, i] = S[i, 0] * g0 + S[i, 1] * g1 + S[i, 2] * g2
-            for a in range(n_local):
-                for b in range(n_local):
-                    geometric = 0.0
-                    product = 0.0
-                    for i in range(3):
-                        geometric += gradients[e, q, i, b] * Sg[a, i]
-                        product += gradients[e, q, i, a] * gradients[e, q, i, b]
-                    for i in range(3):
-                        tangents[e, a, b, i, i] += w * geometric
-                        for j in range(3):
-                            tangents[e, a, b, i, j] += w * (
-                                lam * Fg[a, i] * Dg[b, j] + mu * Fg[b, i] * Dg[a, j] + mu * product * FD[i, j]
-                            )
+            viscous_stress(F, D, lam, mu, S)
+            push_forward(F, gradients[e, q], Fg)
+            push_forward(D, gradients[e, q], Dg)
+            push_forward(S, gradients[e, q], Sg)
+            outer(F, D, FD)
+            add_tangent(w, lam, mu, 1.0, gradients[e, q], Sg, Fg, Dg, FD, tangents[e])
 
 
 @inlined
@@ -72,22 +59,6 @@ def _fields(u: FloatArray, v: FloatArray, nodes: IntArray, gradients: FloatArray
                 t += v[3 * nodes[a] + i] * gradients[j, a]
             F[i, j], D[i, j] = s, t
         F[i, i] += 1.0
-
-
-@inlined
-def _stress(F: FloatArray, D: FloatArray, lam: float, mu: float, S: FloatArray, FD: FloatArray) -> None:
-    """S <- lam tr(E') I + 2 mu E' with E' = sym(F'D), and FD <- F D'."""
-    trace = 0.0
-    for i in range(3):
-        for j in range(3):
-            s, t = 0.0, 0.0
-            for k in range(3):
-                s += F[k, i] * D[k, j] + D[k, i] * F[k, j]
-                t += F[i, k] * D[j, k]
-            S[i, j], FD[i, j] = mu * s, t
-        trace += S[i, i] / (2.0 * mu)
-    for i in range(3):
-        S[i, i] += lam * trace
 
 
 def viscous_stiffness(model: Model, u: FloatArray, v: FloatArray, beta: float) -> sp.csr_matrix:

@@ -32,7 +32,7 @@ from romgen.conjugacy_residual import (
 from romgen.errors import NumericalError
 from romgen.polynomial import zeta
 
-MAX_STEPS = 15
+MAX_STEPS = 60
 # Relative decrease of the cost below which Levenberg-Marquardt has converged.
 DECREASE = 1e-5
 MAX_REJECTIONS = 25

@@ -17,7 +17,7 @@ from fem.loads import Force as ForceOn
 from fem.loads import Load
 from fem.material import Material
 from fem.mesh import Mesh, within
-from fem.modal_quantities import effective_masses, total_masses
+from fem.modal_quantities import effective_masses, near_integer_ratios, total_masses
 from fem.model import (
     Body,
     Bolt,
@@ -44,7 +44,7 @@ from romgen.arrays import IntArray
 from romgen.errors import InputError, NumericalError
 from romgen.progress import Report
 from romgen.settings import BlockSettings, LoadSettings, MeshSettings, Study, named_surfaces, unknown
-from romgen.structure import Interface, Modes, Preload, Structure
+from romgen.structure import RATIO_TOLERANCE, FrequencyRatio, Interface, Modes, Preload, Structure
 
 log = logging.getLogger(__name__)
 
@@ -230,8 +230,10 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
     whole = -basis.shapes.T @ (model.mass @ model.direction(base.direction)) if base else None
     inertia = np.empty((study.modes.count, 0)) if whole is None else whole
     sensors = [Sensor(name, table.point, table.direction) for name, table in study.sensors.items()]
+    frequency = basis.omega / (2.0 * np.pi)
+    near = near_integer_ratios(frequency, tolerance=RATIO_TOLERANCE)
     return Modes(
-        frequency_hz=basis.omega / (2.0 * np.pi),
+        frequency_hz=frequency,
         damping_ratio=damping_ratios(basis, damping),
         shapes=basis.shapes,
         left=basis.left,
@@ -244,6 +246,7 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
         beta=damping.beta,
         effective_mass=effective_masses(model, basis)[:, :3],
         total_mass=float(total_masses(model)[0]),
+        near_ratios=tuple(FrequencyRatio(r.first, r.second, r.low, r.high, r.detuning) for r in near),
     )
 
 

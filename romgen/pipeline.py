@@ -48,7 +48,6 @@ def run(
     ------
     InputError : the study cannot be computed as given.
     NumericalError : a stage did not reach its tolerance.
-    AcceptanceError : the FMU does not repeat the Python model.
     """
     result = execute(stages_of(study), study, run_dir, until=until, force=force, progress=progress)
     write_summary(run_dir / "summary.json", summarise(result))

@@ -10,6 +10,9 @@ import numpy.typing as npt
 from romgen.arrays import FloatArray, IntArray
 from romgen.trajectory import Trajectory
 
+# Frequencies within this share of a ratio of small integers count as near it.
+RATIO_TOLERANCE = 0.1
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -88,6 +91,17 @@ class Preload:
 
 
 @dataclass(frozen=True)
+class FrequencyRatio:
+    """Two modes, counted from 0, with f_second / f_first = (high / low) (1 + detuning), low and high coprime."""
+
+    first: int
+    second: int
+    low: int
+    high: int
+    detuning: float
+
+
+@dataclass(frozen=True)
 class Modes:
     """Undamped modes of the tangent at the preloaded state with stuck contact.
 
@@ -104,6 +118,7 @@ class Modes:
     alpha, beta : Rayleigh coefficients, 1/s and s.
     effective_mass : (n_mode, 3) kg that moves with each mode along x, y, z; empty where it was not computed.
     total_mass : kg.
+    near_ratios : pairs of modes near a ratio of small integers, the nearest first.
     """
 
     frequency_hz: FloatArray = field(metadata={"unit": "Hz", "axes": "mode"})
@@ -121,6 +136,7 @@ class Modes:
         default_factory=lambda: np.empty((0, 3)), metadata={"unit": "kg", "axes": "mode,direction"}
     )
     total_mass: float = float("nan")
+    near_ratios: tuple[FrequencyRatio, ...] = ()
 
 
 @dataclass(frozen=True)

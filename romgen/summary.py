@@ -17,7 +17,6 @@ from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
 from romgen.learning_stages import learning_summary
 from romgen.model_stages import RingDowns
-from romgen.report.mode_tables import near_integer_ratios
 from romgen.runner import RunResult
 from romgen.stage import Context, study_key
 from romgen.store import replace_atomically
@@ -85,8 +84,8 @@ def _modes(context: Context) -> dict[str, Any]:
     modes = context.record("modes", Modes)
     part: dict[str, Any] = {"frequency_hz": modes.frequency_hz, "damping_ratio": modes.damping_ratio}
     part["near_integer_ratios"] = [
-        {"modes": [i + 1, j + 1], "ratio": f"{n}:{m}", "detuning_percent": 100.0 * detuning}
-        for i, j, n, m, detuning in near_integer_ratios(modes.frequency_hz)
+        {"modes": [r.first + 1, r.second + 1], "ratio": f"{r.low}:{r.high}", "detuning_percent": 100.0 * r.detuning}
+        for r in modes.near_ratios
     ]
     if len(modes.effective_mass):
         part |= {"effective_mass_kg": modes.effective_mass, "total_mass_kg": modes.total_mass}

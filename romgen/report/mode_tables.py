@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
-
-from romgen.arrays import FloatArray
 from romgen.report.blocks import TableBlock
 from romgen.report.style import unit_text
-from romgen.structure import Modes
-
-RATIO_TOLERANCE = 0.1
+from romgen.structure import RATIO_TOLERANCE, Modes
 
 
 def frequency_table(modes: Modes) -> TableBlock:
@@ -38,40 +33,16 @@ def frequency_table(modes: Modes) -> TableBlock:
     return TableBlock(caption, ("mode", "frequency [Hz]", "damping ratio [%]", *loads, *masses), rows)
 
 
-def near_integer_ratios(
-    frequency_hz: FloatArray, tolerance: float = RATIO_TOLERANCE, highest: int = 3
-) -> list[tuple[int, int, int, int, float]]:
-    """Pairs of modes whose frequencies are nearly n:m.
-
-    Returns
-    -------
-    (i, j, n, m, detuning) per pair, modes counted from 0, i < j: f_j / f_i = (m / n) (1 + detuning) with
-    abs(detuning) <= tolerance, n and m coprime, 1 <= n <= m <= highest; nearest first.
-    """
-    ratios = [(n, m) for m in range(1, highest + 1) for n in range(1, m + 1) if m == 1 or _coprime(n, m)]
-    found = [
-        (i, j, n, m, float(frequency_hz[j] / frequency_hz[i] * n / m - 1.0))
-        for i, j in itertools.combinations(range(frequency_hz.size), 2)
-        for n, m in ratios
-    ]
-    return sorted((pair for pair in found if abs(pair[4]) <= tolerance), key=lambda pair: abs(pair[4]))
-
-
-def _coprime(n: int, m: int) -> bool:
-    """Whether n < m share no factor."""
-    return n < m and all(m % d or n % d for d in range(2, n + 1))
-
-
 def ratio_table(modes: Modes) -> TableBlock:
     """Near-integer frequency ratios, the candidates for internal resonance."""
     rows = tuple(
         (
-            f"{i + 1} and {j + 1}",
-            f"{n}:{m}",
-            f"{modes.frequency_hz[j] / modes.frequency_hz[i]:.4f}",
-            f"{100.0 * detuning:+.2f}",
+            f"{r.first + 1} and {r.second + 1}",
+            f"{r.low}:{r.high}",
+            f"{modes.frequency_hz[r.second] / modes.frequency_hz[r.first]:.4f}",
+            f"{100.0 * r.detuning:+.2f}",
         )
-        for i, j, n, m, detuning in near_integer_ratios(modes.frequency_hz)
+        for r in modes.near_ratios
     )
     caption = (
         f"Frequency ratios within {100 * RATIO_TOLERANCE:.0f} % of a ratio of small integers. Frequencies "

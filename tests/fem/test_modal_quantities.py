@@ -113,3 +113,10 @@ def test_unstable_equilibrium_is_refused_with_a_shift_too() -> None:
     model = build_model([squeezed], supports=[Support("body.x_min", ("x", "y", "z"))])
     with pytest.raises(FemConvergenceError, match="not positive definite"):
         solve_modes(model, rest_state(model), 2, solver="superlu", shift_hz=1.0)
+
+
+def test_equal_frequencies_are_one_to_one_and_far_ones_are_not_listed() -> None:
+    """2:4 is not listed beside 1:2; 1.75 lies 12 % from 2 and 17 % from 3/2."""
+    pairs = near_integer_ratios(np.array([100.0, 100.0, 150.0]))
+    assert [(p.first, p.second, p.low, p.high) for p in pairs] == [(0, 1, 1, 1), (0, 2, 2, 3), (1, 2, 2, 3)]
+    assert near_integer_ratios(np.array([100.0, 175.0])) == ()

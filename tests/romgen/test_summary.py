@@ -15,7 +15,7 @@ from romgen.result_store import ResultStore, StageInfo
 from romgen.runner import RunResult
 from romgen.settings import Study
 from romgen.stage import Context
-from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, StepEffort
+from romgen.structure import EnergyLedger, FrequencyRatio, Interface, Modes, Preload, RingDown, StepEffort
 from romgen.summary import summarise, write_summary
 from romgen.trajectory import Trajectory
 from tests.romgen.settings.conftest import STUDY
@@ -64,6 +64,7 @@ def summary(tmp_path: Path) -> dict[str, Any]:
         np.zeros((0, 0)),
         0,
         0,
+        near_ratios=(FrequencyRatio(0, 1, 1, 2, -0.1),),
     )
     records = {
         "preload": Preload(EMPTY, (interface(),), EMPTY, EMPTY),

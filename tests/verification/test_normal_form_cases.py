@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 import scipy.io
 from scipy.integrate import solve_ivp
 
-from romgen.arrays import ComplexArray, FloatArray
+from romgen import conjugacy_residual
+from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory
 from romgen.conjugacy import fit_conjugacy, homological_start
 from romgen.normal_form import NormalFormFit, fit_normal_form
@@ -20,6 +22,7 @@ from romgen.reduced_dynamics import decaying_modes
 from romgen.regression import ridge_fit
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
+Scalar = TypeVar("Scalar", np.float64, np.complex128)
 
 
 def decays(
@@ -125,27 +128,32 @@ def test_v27_graph_coefficients() -> None:
     assert fitted[:2] == pytest.approx([0.187110 - 0.415800j, 1.111111], abs=1e-6)
 
 
-def test_duffing_decays_reach_the_known_costs() -> None:
+def test_duffing_decays_reach_the_known_costs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Half the sum of abs(residual)^2 at the optimum, order by order.
 
-    Among the recipes tried (differences of order 2 to 8 and splines, ends dropped or one-sided; rates of the monomials
-    by differences or the chain rule; linear part exact or fitted, with and without ridge) differences of order 4 with
-    one-sided ends and the linear part fitted at each order come closest: -0.05, +0.5, +0.6 and -1.7 %. Other
-    recipes are off by up to 30 %; a wrong sign or Jacobian leaves the cost at 1e-2 or more at every order.
+    Recipe: differences of order 4, one-sided at the ends, for the states *and* the monomials of q, linear part fitted
+    at each order. It meets the known costs within -0.19, +0.24, -0.04 % at orders 3, 5, 7. Order 9 has several
+    minima: a trust-region solver from the same start ends at +0.08 %, this one lower, at -2.6 %.
     """
     path = DATA / "duffing_decays.mat"
     if not path.is_file():
         pytest.skip(f"{path} is absent")
     data = scipy.io.loadmat(path)
     y = np.vstack([x.T for x in data["trajectories"]])
+    lengths = [x.shape[1] for x in data["trajectories"]]
     step = float(data["times"][0, 1])
-    y_dot = np.vstack([_fourth_order(x.T, step) for x in data["trajectories"]])
+    y_dot = _rates(y, lengths, step)
+
+    def differences(zz: ComplexArray, zz_dot: ComplexArray, E: IntArray) -> ComplexArray:
+        return _rates(monomials(zz, E), lengths, step)
+
+    monkeypatch.setattr(conjugacy_residual, "monomial_rate", differences)
     fit = None
-    for order, known, limit in (
-        (3, 0.104049, 1e-3),
-        (5, 0.00397203, 0.01),
-        (7, 0.00053869, 0.01),
-        (9, 2.1877e-4, 0.02),
+    for order, known, below in (
+        (3, 0.104049, 3e-3),
+        (5, 0.00397203, 3e-3),
+        (7, 0.00053869, 3e-3),
+        (9, 2.1877e-4, 0.03),
     ):
         eigenvalues, V = decaying_modes(ridge_fit(monomials(y, exponents(2, 1, order)), y_dot, 0.0)[:, :2])
         q, q_dot = y @ np.linalg.inv(V).T, y_dot @ np.linalg.inv(V).T
@@ -160,10 +168,16 @@ def test_duffing_decays_reach_the_known_costs() -> None:
             more = ((0, 0), (0, len(E) - fit.A.shape[1]))
             start = np.pad(fit.A, more), np.pad(fit.B, more)
         fit = fit_conjugacy((q, q_dot), eigenvalues, E, resonant, start, 1e-14)
-        assert 0.5 * fit.cost * q.size == pytest.approx(known, rel=limit)
+        assert -below < 0.5 * fit.cost * q.size / known - 1.0 < 3e-3
 
 
-def _fourth_order(x: FloatArray, step: float) -> FloatArray:
+def _rates(x: npt.NDArray[Scalar], lengths: list[int], step: float) -> npt.NDArray[Scalar]:
+    """Return x' of trajectories stacked in x."""
+    parts = np.split(x, np.cumsum(lengths)[:-1])
+    return np.vstack([_fourth_order(part, step) for part in parts])
+
+
+def _fourth_order(x: npt.NDArray[Scalar], step: float) -> npt.NDArray[Scalar]:
     """Return x' by differences of order 4, five-point one-sided at both ends."""
     ends = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]]) / 12.0
     inner = (8.0 * (x[3:-1] - x[1:-3]) - (x[4:] - x[:-4])) / 12.0

@@ -16,7 +16,7 @@ from romgen.provenance import collect_provenance
 from romgen.reduced_model import ReducedModel
 from romgen.report import OrderTrial, Reconstruction, ReportInputs, StageCost
 from romgen.settings import ForcedResponseSettings
-from romgen.structure import EnergyLedger, Interface, Modes, Preload, RingDown, StepEffort, Structure
+from romgen.structure import EnergyLedger, FrequencyRatio, Interface, Modes, Preload, RingDown, StepEffort, Structure
 from romgen.trajectory import Trajectory
 
 # Local corners and edge midpoints of the 20-node hexahedron on the grid 0, 1, 2, VTK order.
@@ -102,7 +102,8 @@ def modes(structure: Structure) -> Modes:
     load = np.array([[-0.31], [0.002], [-0.05]])
     frequency, damping = np.array([109.7, 198.8, 302.0]), np.array([0.004, 0.004, 0.0052])
     names = ("base_acceleration",), ("m/s2",), ("mid", "corner")
-    return Modes(frequency, damping, shapes, shapes, load, *names, sensors, 3.5, 4e-6)
+    near = (FrequencyRatio(0, 1, 1, 2, -0.0939),)
+    return Modes(frequency, damping, shapes, shapes, load, *names, sensors, 3.5, 4e-6, near_ratios=near)
 
 
 def decay(name: str, amplitudes: tuple[float, float], shift: float = 0.0) -> Trajectory:
