@@ -10,8 +10,8 @@ import time
 import zipfile
 from pathlib import Path
 
+from benchmarks.fmu_importer import both_from_one_loop, build_loop, simulated, through_fmpy
 from romgen.fmu.compilers import host_platform
-from romgen.fmu.driver import Slave, opened_slave
 from romgen.fmu.export import export_fmu
 from romgen.fmu.python_export import export_pythonfmu
 from romgen.fmu.records import FmuExport
@@ -19,16 +19,17 @@ from romgen.settings import FmuSettings
 from tests.romgen.fmu.models import random_model
 
 H = 1e-4
-N_NATIVE, N_PYTHON, N_C = 10_000, 1_000, 200_000
+N_C = 200_000
 REPEATS = 5
 TIMING = Path(__file__).with_name("fmu_timing.c")
+Row = tuple[str, float, str]
 
 
-def from_c(native: FmuExport) -> tuple[float, float, float] | None:
-    """Microseconds of instantiate, step, and set + step + read, from plain C; None without a host compiler."""
+def from_c(native: FmuExport) -> list[Row]:
+    """Instantiate, step, and set + step + read from a C program of its own; [] without a host compiler."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None or host_platform() not in native.platforms:
-        return None
+        return []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with zipfile.ZipFile(native.path) as archive:
@@ -39,33 +40,41 @@ def from_c(native: FmuExport) -> tuple[float, float, float] | None:
         library = next((folder / "binaries" / host_platform()).iterdir())
         command = [str(program), str(library), str(N_C), (folder / "resources").as_uri()]
         runs = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(REPEATS)]
-    instantiate, step, whole = (min(column) for column in zip(*(map(float, run.split()) for run in runs), strict=True))
-    return instantiate, step, whole
+    best = [min(column) for column in zip(*(map(float, run.split()) for run in runs), strict=True)]
+    names = ("instantiate + free", "doStep", "set + doStep + get")
+    return [(f"C program: native, {name}", value, "us") for name, value in zip(names, best, strict=True)]
 
 
-def through_fmpy(path: str, n: int) -> tuple[float, float]:
-    """Microseconds of doStep alone and of set + doStep + get, driven by fmpy; the best of several runs."""
-    with opened_slave(path) as slave:
-        slave.fmu.setupExperiment(startTime=0.0)
-        slave.fmu.setReal([slave.references.states[0]], [0.5])
-        slave.fmu.enterInitializationMode()
-        slave.fmu.exitInitializationMode()
-        return min(_step_times(slave, n)[0] for _ in range(REPEATS)), min(
-            _step_times(slave, n)[1] for _ in range(REPEATS)
-        )
+def same_loop(native: FmuExport, python: FmuExport, loop: Path) -> list[Row]:
+    """Both units called by one C loop inside one process: the like-for-like ratio."""
+    ours, theirs = (both_from_one_loop(unit.path, loop, H) for unit in (native, python))
+    rows: list[Row] = []
+    for what, a, b in zip(("doStep", "set + doStep + get"), ours, theirs, strict=True):
+        rows += [(f"one C loop: native, {what}", a, "us"), (f"one C loop: pythonfmu, {what}", b, "us")]
+        rows.append((f"one C loop: ratio of {what}", b / a, ""))
+    return rows
 
 
-def _step_times(slave: Slave, n: int) -> tuple[float, float]:
-    fmu, vr = slave.fmu, slave.references
-    start = time.perf_counter()
-    for k in range(n):
-        fmu.doStep(k * H, H)
-    middle = time.perf_counter()
-    for k in range(n):
-        fmu.setReal(vr.inputs, [1e-3 * (k % 2)])
-        fmu.doStep(k * H, H)
-        fmu.getReal(vr.displacement)
-    return 1e6 * (middle - start) / n, 1e6 * (time.perf_counter() - middle) / n
+def importer(native: FmuExport, python: FmuExport, loop: Path) -> list[Row]:
+    """Both units driven by fmpy, and fmpy driving functions that return at once."""
+    ours, theirs = through_fmpy(native.path, H), through_fmpy(python.path, H)
+    nothing = through_fmpy(native.path, H, loop)
+    rows: list[Row] = []
+    for k, what in enumerate(("doStep", "set + doStep + get")):
+        rows += [(f"fmpy: native, {what}", ours[k], "us"), (f"fmpy: pythonfmu, {what}", theirs[k], "us")]
+        rows.append((f"fmpy: functions that return at once, {what}", nothing[k], "us"))
+        rows.append((f"fmpy: ratio of {what}", theirs[k] / ours[k], ""))
+        rows.append((f"fmpy: ratio of a native unit that takes no time, {what}", theirs[k] / nothing[k], ""))
+    return rows
+
+
+def whole_runs(native: FmuExport, python: FmuExport) -> list[Row]:
+    """One call of fmpy.simulate_fmu over 1 s from the archive, and its parts before the first step."""
+    ours, theirs = simulated(native.path, H), simulated(python.path, H)
+    parts = ("unpack", "read the description", "load, instantiate, initialise")
+    rows: list[Row] = [(f"simulate_fmu: native, {name}", 1e3 * s, "ms") for name, s in zip(parts, ours, strict=False)]
+    rows += [("simulate_fmu: native, 10,000 steps", ours[-1], "s"), ("simulate_fmu: pythonfmu", theirs[-1], "s")]
+    return [*rows, ("simulate_fmu: ratio", theirs[-1] / ours[-1], "")]
 
 
 def main() -> None:
@@ -78,26 +87,16 @@ def main() -> None:
         native = export_fmu(model, Path(folder) / "native.fmu", settings)
         export_s = time.perf_counter() - start
         python = export_pythonfmu(model, Path(folder) / "python.fmu", settings)
-        native_us, native_pass_us = through_fmpy(native.path, N_NATIVE)
-        python_us, python_pass_us = through_fmpy(python.path, N_PYTHON)
-        c_times = from_c(native)
+        loop = build_loop(Path(folder))
+        rows = from_c(native)
+        if loop is not None:
+            rows += [*same_loop(native, python, loop), *importer(native, python, loop)]
+        rows += whole_runs(native, python)
+    rows.append((f"size with {len(native.platforms)} platform(s) and sources", native.size_bytes / 1e3, "kB"))
+    rows.append((f"export, compilers warm ({native.compiler})", export_s, "s"))
     print(f"model: 4 states, order 7, 3 sensors, steps of {H} s; best of {REPEATS} runs")
-    rows = [
-        ("native, doStep through fmpy", native_us, "us"),
-        ("native, set + doStep + get through fmpy", native_pass_us, "us"),
-        ("pythonfmu, doStep through fmpy", python_us, "us"),
-        ("pythonfmu, set + doStep + get through fmpy", python_pass_us, "us"),
-        ("ratio of doStep through fmpy", python_us / native_us, ""),
-        ("ratio of the whole pass through fmpy", python_pass_us / native_pass_us, ""),
-        (f"size with {len(native.platforms)} platform(s) and sources", native.size_bytes / 1e3, "kB"),
-        (f"export, compilers warm ({native.compiler})", export_s, "s"),
-    ]
-    if c_times is not None:
-        names = ("native, instantiate + free from C", "native, doStep from C", "native, set + doStep + get from C")
-        rows = [*((name, value, "us") for name, value in zip(names, c_times, strict=True)), *rows]
-        rows.append(("ratio pythonfmu doStep through fmpy : native from C", python_us / c_times[1], ""))
     for name, value, unit in rows:
-        print(f"{name:<56}{value:>12.3f} {unit}")
+        print(f"{name:<72}{value:>12.3f} {unit}")
 
 
 if __name__ == "__main__":

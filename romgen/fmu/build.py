@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import tempfile
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,30 +75,46 @@ def build_binaries(
     with tempfile.TemporaryDirectory(prefix="romgen_fmu_") as folder:
         for name, content in sources.items():
             (Path(folder) / name).write_bytes(content)
-        for k, name in enumerate(possible):
-            report(k / len(possible), _message(compiler, name))
-            library = f"{identifier}{EXTENSIONS.get(name, '.so')}"
-            files[f"binaries/{name}/{library}"] = _compile(compiler, name, Path(folder), library)
+        slices = _slices(compiler, identifier, possible, Path(folder), report)
+    for name in possible:
+        parts = [slices[target] for target in _targets(compiler, name)]
+        library = parts[0] if len(parts) == 1 else universal_binary(parts)
+        files[f"binaries/{name}/{_library(identifier, name)}"] = library
     report(1.0, "binaries built")
     return Binaries(files, possible, compiler.name if files else "none", notes if left_out else ())
 
 
-def _message(compiler: Compiler, name: str) -> str:
-    first = compiler.is_zig and is_first_use(name)
-    return f"compiling {name}" + ("; zig prepares this platform once, some seconds" if first else "")
+def _targets(compiler: Compiler, name: str) -> tuple[str | None, ...]:
+    return TARGETS[name] if compiler.is_zig else (None,)
 
 
-def _compile(compiler: Compiler, name: str, folder: Path, library: str) -> bytes:
-    """The bytes of the library of one platform; several targets become one universal file."""
-    slices = []
-    for target in TARGETS[name] if compiler.is_zig else (None,):
-        output = folder / (target or "host") / library
-        output.parent.mkdir(exist_ok=True)
-        compile_library(compiler, target, folder, output.relative_to(folder))
-        slices.append(output.read_bytes())
-    if compiler.is_zig:
+def _library(identifier: str, name: str) -> str:
+    return f"{identifier}{EXTENSIONS.get(name, '.so')}"
+
+
+def _slices(
+    compiler: Compiler, identifier: str, platforms: tuple[str, ...], folder: Path, report: Report
+) -> dict[str | None, bytes]:
+    """The library of every target, each compiled once, as many at a time as there are processors."""
+    outputs = {
+        target: Path(target or "host") / _library(identifier, name)
+        for name in platforms
+        for target in _targets(compiler, name)
+    }
+    first = [name for name in platforms if compiler.is_zig and is_first_use(name)]
+    text = f"compiling {', '.join(platforms)}"
+    text += f"; zig prepares {', '.join(first)} once, some seconds" if first else ""
+    report(0.0, text)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = {
+            pool.submit(compile_library, compiler, target, folder, output): output for target, output in outputs.items()
+        }
+        for k, job in enumerate(as_completed(jobs), 1):
+            job.result()
+            report(k / len(jobs), text)
+    for name in platforms if compiler.is_zig else ():
         remember_use(name)
-    return slices[0] if len(slices) == 1 else universal_binary(slices)
+    return {target: (folder / output).read_bytes() for target, output in outputs.items()}
 
 
 def universal_binary(slices: list[bytes]) -> bytes:

@@ -10,7 +10,7 @@ import struct
 import subprocess
 import sys
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from romgen.errors import InputError, RomgenError
 
@@ -23,10 +23,12 @@ TARGETS: dict[str, tuple[str, ...]] = {
 }
 """Zig targets of each FMI platform; two targets make one universal file."""
 
-FLAGS = ("-std=c99", "-Os", "-s", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+COMPILE = ("-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 """No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
 
-FAST_FILES = ("rom_kernel.c", "rom_etdrk4.c")
+LINK = ("-s", "-shared")
+
+FAST_FILES = ("rom_etdrk4.c", "rom_kernel.c")
 """Files in which steps spend their time are compiled for speed, the others for size."""
 
 NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
@@ -104,50 +106,58 @@ def find_compiler() -> Compiler | None:
 def compile_library(compiler: Compiler, target: str | None, sources: Path, output: Path) -> None:
     """Compile all C files of a folder into the shared library ``output``.
 
-    The output name is written into Windows and macOS libraries, so it must be the final file name; paths are relative
-    to the folder, so that the bytes do not depend on where it lies.
+    They are compiled as two translation units, which include the files, one for speed and one for size: starting a
+    compiler for every file would take most of the time. The output name is written into Windows and macOS libraries,
+    so it must be the final file name; paths are relative to the folder, so that the bytes do not depend on where it
+    lies. Several targets may be compiled at once, each in the folder of its output.
+
+    Parameters
+    ----------
+    compiler, target : of ``find_compiler`` and TARGETS; None for this machine.
+    sources : the folder.
+    output : path in that folder, in a folder of its own below it.
 
     Raises
     ------
     RomgenError : with the compiler's own words when it fails.
     """
+    build = output.parent
+    (sources / build).mkdir(parents=True, exist_ok=True)
     files = sorted(path.name for path in sources.glob("*.c"))
-    if target and "windows" in target:
-        _compile_for_windows(compiler, target, sources, output, files)
-        return
-    start = [*compiler.command, *(["-target", target] if target else []), *FLAGS, *NO_UNWIND_TABLES]
-    fast = [name for name in files if name in FAST_FILES]
-    objects = [f"{Path(name).stem}.o" for name in fast]
-    for name, compiled in zip(fast, objects, strict=True):
-        flags = [flag for flag in start if flag not in {"-shared", "-s"}]
-        _run(compiler, target, [*flags, *_fast(name), "-c", name, "-o", compiled], sources)
-    others = [name for name in files if name not in FAST_FILES]
-    _run(compiler, target, [*start, "-o", str(output), *others, *objects, "-lm"], sources)
-    for name in objects:
-        (sources / name).unlink()
+    fast = _unit(sources, build / "fast.c", [name for name in files if name in FAST_FILES])
+    rest = _unit(sources, build / "rest.c", [name for name in files if name not in FAST_FILES])
+    windows = target is not None and "windows" in target
+    compile_flags = (*(("-target", target) if target else ()), *COMPILE, *(() if windows else NO_UNWIND_TABLES))
+
+    def compiled(unit: str, level: str) -> str:
+        made = str(PurePosixPath(unit).with_suffix(".o"))
+        _run(compiler, target, [*compiler.command, *compile_flags, level, "-c", unit, "-o", made], sources)
+        return made
+
+    parts = [compiled(fast, "-O2"), *(_windows_parts(compiler, target, sources, build) if windows else ("-lm",))]
+    # zig hides the C library's headers where -nostdlib is given, so that on Windows all is compiled before it is linked
+    parts.insert(0, compiled(rest, "-Os") if windows else rest)
+    link = [*compiler.command, *compile_flags, "-Os", *LINK, "-o", output.as_posix(), *parts]
+    _run(compiler, target, link, sources)
+    if windows:
+        (sources / output).write_bytes(without_time((sources / output).read_bytes()))
 
 
-def _compile_for_windows(compiler: Compiler, target: str, sources: Path, output: Path, files: list[str]) -> None:
-    """Link against msvcrt.dll alone: it is part of every Windows, and no C library has to be built first."""
-    (sources / "msvcrt.def").write_text("\n".join(["LIBRARY msvcrt.dll", "EXPORTS", *WINDOWS_IMPORTS, ""]))
-    (sources / "dll_entry.c").write_text(WINDOWS_ENTRY)
-    compile_flags = ["-target", target, *(flag for flag in FLAGS if flag not in {"-shared", "-s"})]
-    objects = [f"{Path(name).stem}.obj" for name in (*files, "dll_entry.c")]
-    for name, compiled in zip((*files, "dll_entry.c"), objects, strict=True):
-        _run(compiler, target, [*compiler.command, *compile_flags, *_fast(name), "-c", name, "-o", compiled], sources)
-    tool = ["dlltool", "-m", "i386:x86-64", "-d", "msvcrt.def", "-l", "msvcrt.lib"]
+def _unit(sources: Path, unit: Path, files: list[str]) -> str:
+    """Write one C file that includes others of the folder above its own; its path as the compiler is given it."""
+    up = "/".join(".." for _ in unit.parent.parts)
+    (sources / unit).write_text("".join(f'#include "{up}/{name}"\n' for name in files), encoding="ascii")
+    return unit.as_posix()
+
+
+def _windows_parts(compiler: Compiler, target: str | None, sources: Path, build: Path) -> list[str]:
+    """Arguments of the linker for msvcrt.dll alone: it is part of every Windows, no C library has to be built."""
+    definition, imports, entry = ((build / name).as_posix() for name in ("msvcrt.def", "msvcrt.lib", "dll_entry.c"))
+    (sources / definition).write_text("\n".join(["LIBRARY msvcrt.dll", "EXPORTS", *WINDOWS_IMPORTS, ""]))
+    (sources / entry).write_text(WINDOWS_ENTRY)
+    tool = ["dlltool", "-m", "i386:x86-64", "-d", definition, "-l", imports]
     _run(compiler, target, [*compiler.command[:-1], *tool], sources)
-    link = ["-target", target, "-shared", "-s", "-nostdlib", "-o", str(output), *objects, "msvcrt.lib"]
-    _run(compiler, target, [*compiler.command, *link], sources)
-    library = sources / output
-    library.write_bytes(without_time(library.read_bytes()))
-    for name in ("dll_entry.c", "msvcrt.def", "msvcrt.lib", *objects):
-        (sources / name).unlink(missing_ok=True)
-
-
-def _fast(name: str) -> list[str]:
-    """The flag that replaces -Os, the last one counts."""
-    return ["-O2"] if name in FAST_FILES else []
+    return ["-nostdlib", entry, imports]
 
 
 def without_time(library: bytes) -> bytes:
@@ -157,7 +167,7 @@ def without_time(library: bytes) -> bytes:
 
 
 def _run(compiler: Compiler, target: str | None, command: list[str], folder: Path) -> None:
-    result = subprocess.run(command, cwd=folder, env=_environment(), capture_output=True, text=True, check=False)
+    result = subprocess.run(command, cwd=folder, env=_environment(folder), capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise RomgenError(
             f"{compiler.name} could not compile the runtime",
@@ -193,8 +203,7 @@ def _mark(platform_name: str) -> Path:
     return cache_folder() / f"{platform_name}.ready"
 
 
-def _environment() -> dict[str, str]:
-    """The caller's environment, with zig's caches in the user's cache folder unless set already."""
-    folder = cache_folder()
-    defaults = {"ZIG_GLOBAL_CACHE_DIR": str(folder / "global"), "ZIG_LOCAL_CACHE_DIR": str(folder / "local")}
+def _environment(folder: Path) -> dict[str, str]:
+    """The caller's environment, with zig's caches set unless they are: C libraries are kept, objects are not."""
+    defaults = {"ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "global"), "ZIG_LOCAL_CACHE_DIR": str(folder / "zig")}
     return {**defaults, **os.environ}

@@ -58,7 +58,7 @@ def test_strict_c99_without_warnings_in_zig(tmp_path: Path) -> None:
         pytest.skip("ziglang is not installed")
     folder = write_sources(linear_free_model(), tmp_path)
     zig = Compiler("zig", (sys.executable, "-m", "ziglang", "cc", *STRICT[1:]), True)
-    compile_library(zig, TARGETS["linux64"][0], folder, Path("x.so"))
+    compile_library(zig, TARGETS["linux64"][0], folder, Path("build") / "x.so")
 
 
 def test_exactly_the_44_functions_are_exported(run_cc: Callable[..., None], tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_a_failing_compiler_is_reported_in_its_own_words(tmp_path: Path) -> None
     if compiler is None:
         pytest.skip("no C compiler")
     with pytest.raises(RomgenError, match="expected expression"):
-        compile_library(compiler, None, tmp_path, Path("x.so"))
+        compile_library(compiler, None, tmp_path, Path("build") / "x.so")
 
 
 def test_universal_file_holds_both_slices_on_page_boundaries() -> None:
