@@ -63,7 +63,7 @@ class Validation:
 def fmu_stages(study: Study) -> tuple[Stage, ...]:
     """Return the stages for export and check."""
     return (
-        Stage("fmu", Exported, ("learn",), ("study", "fmu"), export, _unit_names),
+        Stage("fmu", Exported, ("learn",), ("study", "forced_response", "fmu"), export, _unit_names),
         Stage("validation", Validation, ("learn", "fmu"), (), validate),
     )
 
@@ -85,6 +85,8 @@ def export(context: Context) -> Exported:
         origin=(f"study {study.name}", f"inputs sha256 {context.key}"),
         errors_percent=errors,
         base_share=_base_share(study),
+        input_range=_input_range(study, model.inputs),
+        picture=None if study.fmu.icon is None else study.fmu.icon.read_bytes(),
     )
     native = export_fmu(model, _path(context, ""), study.fmu, info=info, report=context.report)
     for note in native.notes:
@@ -102,6 +104,15 @@ def _base_share(study: Study) -> tuple[float, ...]:
     if base is None:
         return ()
     return tuple(float(sensor.direction == base.direction) for sensor in study.sensors.values())
+
+
+def _input_range(study: Study, inputs: tuple[str, ...]) -> tuple[tuple[float, float], ...]:
+    """Ranges given in the study, else as far as the forced response goes; () unless every input has one."""
+    forced = study.forced_response
+    highest = max((abs(level) for level in forced.levels), default=0.0)
+    computed = {forced.input: (-highest, highest)} if highest > 0.0 else {}
+    known = {**computed, **study.fmu.input_range}
+    return tuple(known[name] for name in inputs) if set(inputs) <= set(known) else ()
 
 
 def validate(context: Context) -> Validation:

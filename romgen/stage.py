@@ -15,7 +15,7 @@ from romgen.errors import InputError
 from romgen.progress import Report
 from romgen.result_store import ResultStore, StageInfo
 from romgen.segments import SegmentStore
-from romgen.settings import DataSettings, MeshSettings, Settings, Study
+from romgen.settings import DataSettings, FmuSettings, MeshSettings, Settings, Study
 from romgen.source_digest import source_digest
 from romgen.store import SCHEMA_VERSION
 
@@ -114,6 +114,8 @@ def table_content(study: Study, table: str) -> Any:
     value: Any = reduce(getattr, table.split("."), study)
     if isinstance(value, DataSettings):
         return {**value.model_dump(mode="json"), "files": [_file_sha256(path) for path in value.files]}
+    if isinstance(value, FmuSettings) and value.icon is not None:
+        return {**value.model_dump(mode="json"), "icon": _file_sha256(value.icon)}
     return _plain(value)
 
 

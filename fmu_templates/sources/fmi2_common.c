@@ -32,12 +32,17 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
     return fmi2OK;
 }
 
+/* As many whole characters as there is room for */
 static void copy_name(char target[], size_t size, const char *name)
 {
-    size_t n = strlen(name);
-    if (n >= size)
-        n = size - 1;
-    memcpy(target, name, n);
+    size_t n = 0;
+    while (name[n] != '\0') {
+        const size_t length = rom_utf8_length(name + n), step = length == 0 ? 1 : length;
+        if (n + step >= size)
+            break;
+        memcpy(target + n, name + n, step);
+        n += step;
+    }
     target[n] = '\0';
 }
 

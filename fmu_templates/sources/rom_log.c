@@ -48,10 +48,34 @@ static void put(message *m, char c)
     m->text[m->n] = '\0';
 }
 
+size_t rom_utf8_length(const char *text)
+{
+    const unsigned char *c = (const unsigned char *)text;
+    if (c[0] < 0x80)
+        return c[0] != 0;
+    const size_t n = c[0] >= 0xf0 ? 4 : c[0] >= 0xe0 ? 3 : 2;
+    const int legal = c[0] >= 0xc2 && c[0] <= 0xf4 && !(c[0] == 0xe0 && c[1] < 0xa0) && !(c[0] == 0xed && c[1] > 0x9f) &&
+                      !(c[0] == 0xf0 && c[1] < 0x90) && !(c[0] == 0xf4 && c[1] > 0x8f);
+    for (size_t k = 1; legal && k < n; ++k)
+        if ((c[k] & 0xc0) != 0x80)
+            return 0;
+    return legal ? n : 0;
+}
+
+/* Whole characters only: what is no UTF-8 becomes '?', what would break a line a blank. */
 static void put_text(message *m, const char *text)
 {
-    for (; *text != '\0'; ++text)
-        put(m, *text);
+    while (*text != '\0') {
+        const size_t n = rom_utf8_length(text);
+        if (n <= 1)
+            put(m, n == 0 ? '?' : (unsigned char)*text < ' ' ? ' ' : *text);
+        else if (m->n + n < LENGTH) {
+            memcpy(m->text + m->n, text, n);
+            m->n += n;
+            m->text[m->n] = '\0';
+        }
+        text += n == 0 ? 1 : n;
+    }
 }
 
 static void put_digits(message *m, unsigned long value, int width)

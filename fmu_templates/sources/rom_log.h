@@ -27,6 +27,9 @@ typedef struct {
 /* Bit of a category by its name in modelDescription.xml, 0 if there is none. */
 unsigned rom_category_mask(const char *name);
 
+/* Bytes of the character at `text` (UTF-8, RFC 3629), 0 where there is none. */
+size_t rom_utf8_length(const char *text);
+
 void rom_log(const rom_logger *logger, fmi2Status status, unsigned category, const char *subject, const char *text);
 
 /* As rom_log, followed by " <value>" with seven digits and " <unit>". */

@@ -27,6 +27,7 @@
 #define rom_etdrk4_step ROM_NAME(rom_etdrk4_step)
 #define rom_log ROM_NAME(rom_log)
 #define rom_log_value ROM_NAME(rom_log_value)
+#define rom_utf8_length ROM_NAME(rom_utf8_length)
 #define rom_category_mask ROM_NAME(rom_category_mask)
 #define rom_refuse ROM_NAME(rom_refuse)
 #define rom_fail ROM_NAME(rom_fail)

@@ -37,6 +37,14 @@ static const char *without_host(const char *text)
     return text[2] == '/' || is_drive(text + 2) ? text + 2 : text;
 }
 
+/* Behind the prefix \\?\ Windows takes no other separator. */
+static void use_backslashes(char path[])
+{
+    for (char *c = path; *c != '\0'; ++c)
+        if (*c == '/')
+            *c = '\\';
+}
+
 int rom_resource_path(const char *location, const char *file, int windows, char path[], size_t size)
 {
     if (location == NULL || location[0] == '\0')
@@ -61,7 +69,10 @@ int rom_resource_path(const char *location, const char *file, int windows, char 
         path[1] = ':'; /* C| is an old form of C: */
     if (n == 0)
         return 0;
-    path[n++] = '/';
+    if (path[n - 1] != '/' && !(windows && path[n - 1] == '\\'))
+        path[n++] = '/';
     memcpy(path + n, file, n_file + 1);
+    if (windows && strncmp(path, "\\\\?\\", 4) == 0)
+        use_backslashes(path);
     return 1;
 }

@@ -38,7 +38,8 @@ static FILE *open_to_read(const char *path)
         wide[n++] = (wchar_t)code;
     }
     wide[n] = L'\0';
-    return _wfopen(wide, L"rb");
+    FILE *file = _wfopen(wide, L"rb");
+    return file != NULL ? file : fopen(path, "rb"); /* some importers write paths in the system's own code page */
 }
 #else
 #define ON_WINDOWS 0
@@ -64,15 +65,24 @@ static uint64_t decoded(rom_tables *tables)
     return hash;
 }
 
+/* The file at `path` under the resource location, or under its folder "resources": some importers give the folder of the unit. */
+static FILE *opened(const char *location, char path[ROM_PATH_SIZE])
+{
+    char below[ROM_PATH_SIZE];
+    FILE *file = open_to_read(path);
+    if (file == NULL && rom_resource_path(location, "resources/coefficients.bin", ON_WINDOWS, below, ROM_PATH_SIZE))
+        file = open_to_read(below);
+    return file;
+}
+
 const char *rom_fill_tables(const char *location, rom_tables *tables, char path[ROM_PATH_SIZE])
 {
     unsigned char beyond;
-    path[0] = '\0';
     if (!rom_resource_path(location, "coefficients.bin", ON_WINDOWS, path, ROM_PATH_SIZE)) {
         path[0] = '\0';
         return "the resource location is missing, no file URI, or too long; the coefficients of the model lie there";
     }
-    FILE *file = open_to_read(path);
+    FILE *file = opened(location, path);
     if (file == NULL)
         return "the coefficients cannot be opened; the resource location must be the resources folder of the unpacked unit";
     const int complete = fread(tables, sizeof *tables, 1, file) == 1 && fread(&beyond, 1, 1, file) == 0;

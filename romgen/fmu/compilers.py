@@ -35,8 +35,8 @@ NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 """Nothing is thrown through the runtime; Windows keeps the tables, which its debuggers walk the stack by."""
 
 
-WINDOWS_IMPORTS = ("_wfopen", "atan2", "calloc", "ceil", "cos", "exp", "fclose", "fread", "free", "memcpy", "memmove",
-                   "memset", "sin", "sqrt", "strcmp", "strlen", "strncmp")  # fmt: skip
+WINDOWS_IMPORTS = ("_wfopen", "atan2", "calloc", "ceil", "cos", "exp", "fclose", "fopen", "fread", "free", "memcpy",
+                   "memmove", "memset", "sin", "sqrt", "strcmp", "strlen", "strncmp")  # fmt: skip
 """Functions of the Windows C library that the runtime calls."""
 
 WINDOWS_ENTRY = """int _fltused = 1; /* asked for by compilers where floating-point numbers are used */

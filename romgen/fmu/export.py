@@ -21,7 +21,7 @@ from romgen.fmu.model_file import model_resources
 from romgen.fmu.records import PLAIN, FmuExport, FmuInfo, InterfaceOptions
 from romgen.fmu.selection import exported_model, interface_options
 from romgen.fmu.tables import table_bytes
-from romgen.fmu.templates import licence_files, runtime_sources
+from romgen.fmu.templates import default_icon, licence_files, runtime_sources
 from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
@@ -91,8 +91,7 @@ def _content(
         "documentation/index.html": documentation_page(model, interface, text).encode(),
         **model_resources(model, in_file=options.coefficients_in_file),
         **licence_files(),
+        "model.png": info.picture or default_icon(),
         **{f"sources/{name}": data for name, data in generated_sources(model, guid, options).items()},
     }
-    if info.picture is not None:
-        content["model.png"] = info.picture
     return content, guid

@@ -19,7 +19,7 @@ from romgen.fmu.interface import build_interface
 from romgen.fmu.model_file import model_resources
 from romgen.fmu.records import FmuExport, FmuInfo, InterfaceOptions
 from romgen.fmu.selection import exported_model, interface_options
-from romgen.fmu.templates import licence_files, licence_files3, render, runtime_sources3
+from romgen.fmu.templates import default_icon, licence_files, licence_files3, render, runtime_sources3
 from romgen.fmu.units import unit_of
 from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
@@ -112,11 +112,10 @@ def _content(
         **model_resources(model, in_file=options.coefficients_in_file),
         "sources/buildDescription.xml": render("buildDescription.xml.j2", name=model.name, source_files=files).encode(),
         **licence_files(),
+        "terminalsAndIcons/icon.png": info.picture or default_icon(),
         **licence_files3(),
         **{f"sources/{name}": data for name, data in sources.items()},
     }
-    if info.picture is not None:
-        content["terminalsAndIcons/icon.png"] = info.picture
     return content, guid
 
 

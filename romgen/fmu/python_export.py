@@ -28,7 +28,7 @@ from romgen.fmu.interface import FmuInterface, build_interface
 from romgen.fmu.model_file import model_json
 from romgen.fmu.records import FmuExport, FmuInfo, InterfaceOptions
 from romgen.fmu.selection import exported_model, interface_options
-from romgen.fmu.templates import licence_files, template_text
+from romgen.fmu.templates import default_icon, licence_files, template_text
 from romgen.fmu.variable import Variable
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
@@ -67,6 +67,7 @@ def export_pythonfmu(
     content = {
         **_built_by_pythonfmu(resources, f"{chosen.name}_slave.py"),
         **licence_files(),
+        "model.png": text.info.picture or default_icon(),
         "documentation/licenses/pythonfmu.txt": _pythonfmu_licence(),
         "documentation/index.html": documentation_page(chosen, interface, text).encode(),
         "modelDescription.xml": model_description(text, interface, guid=guid, date=generation_time()).encode(),

@@ -18,10 +18,10 @@ class FmuInfo:
     version : version of the model.
     origin : how the model was made, one entry per line of the documentation page.
     errors_percent : (trajectory, NMTE in percent) rows of the error table.
-    input_range : (minimum, maximum) of each model input in training, SI units, or () where unknown.
+    input_range : (minimum, maximum) of each model input that the model was made for, SI units, or () where unknown.
     base_share : cosine between each sensor of the model and the motion of the base, for absolute outputs; () for 1.
     stop_time : s, of the default experiment.
-    picture : PNG bytes of the icon, or None.
+    picture : PNG bytes of the icon; None for romgen's own.
     """
 
     description: str = "Reduced model of a nonlinear structure on a spectral submanifold"
@@ -43,7 +43,7 @@ class InterfaceOptions:
 
     Attributes
     ----------
-    input_range : (minimum, maximum) of each model input in training, SI units, or () where unknown.
+    input_range : (minimum, maximum) of each model input that the model was made for, SI units, or () where unknown.
     base_share : for absolute outputs, the share of the motion of the base that each exported sensor sees; None without.
     start_from_sensors : start values are displacements and velocities of the sensors instead of the states.
     coefficients_in_file : the large tables are read from the resources instead of compiled in.

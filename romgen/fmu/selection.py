@@ -59,8 +59,9 @@ def interface_options(model: ReducedModel, settings: FmuSettings, info: FmuInfo)
 
     Raises
     ------
-    InputError : for absolute outputs without motion of the base, or shares that do not fit the sensors.
+    InputError : for ranges without 0, absolute outputs without motion of the base, shares that do not fit the sensors.
     """
+    _check_ranges(model, info)
     share = None
     if settings.absolute:
         if BASE_ACCELERATION not in model.inputs:
@@ -72,6 +73,15 @@ def interface_options(model: ReducedModel, settings: FmuSettings, info: FmuInfo)
         names = model.sensors if settings.sensors is None else settings.sensors
         share = tuple(given[model.sensors.index(name)] for name in names)
     return InterfaceOptions(info.input_range, share, settings.start == "sensors", _in_file(settings))
+
+
+def _check_ranges(model: ReducedModel, info: FmuInfo) -> None:
+    if info.input_range and len(info.input_range) != len(model.inputs):
+        raise InputError("one range per input is needed", where="FmuInfo.input_range", value=info.input_range)
+    for name, (low, high) in zip(model.inputs, info.input_range, strict=False):
+        if not (np.isfinite([low, high]).all() and low <= 0.0 <= high and low < high):
+            advice = "inputs start at 0"
+            raise InputError(f"the range of {name} must hold 0", where=WHERE, value=(low, high), advice=advice)
 
 
 def _in_file(settings: FmuSettings) -> bool:

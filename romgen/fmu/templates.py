@@ -40,6 +40,11 @@ def licence_files3() -> dict[str, bytes]:
     return {"documentation/licenses/fmi3_headers.txt": (files("fmu_templates") / "fmi3" / "LICENSE.txt").read_bytes()}
 
 
+def default_icon() -> bytes:
+    """The picture of a unit that is given none: a motion spiralling down on a bowl, PNG."""
+    return (files("fmu_templates") / "icon.png").read_bytes()
+
+
 def template_text(name: str) -> str:
     """The text of one template file."""
     return (files("fmu_templates") / name).read_text(encoding="utf-8")

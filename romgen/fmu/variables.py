@@ -92,6 +92,7 @@ def _inputs(model: ReducedModel, input_range: tuple[tuple[float, float], ...]) -
             "0",
             low,
             high,
+            None if low is None or high is None else two_digits(max(abs(low), abs(high))),
         )
         for name, given, unit, (low, high) in zip(
             input_names(model), model.inputs, model.input_units, ranges, strict=True

@@ -10,9 +10,11 @@ import numpy as np
 
 from romgen.settings.data import DataSettings
 from romgen.settings.finite_elements import BlockSettings, RingDownSettings
+from romgen.settings.learning import FmuSettings
 from romgen.settings.study import Study
 
 PLATFORMS = ("host", "all", "linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin")
+PNG = b"\x89PNG\r\n\x1a\n"
 # Plausible solids, foam to tungsten; outside of it the unit system is probably not SI.
 DENSITY_RANGE = (50.0, 25_000.0)
 YOUNG_MODULUS_RANGE = (1e6, 2e12)
@@ -205,9 +207,25 @@ def _downstream_problems(study: Study) -> Iterator[str]:
         yield unknown("[forced_response] input:", "load input", forced.input, inputs)
     if study.forced_validation is not None and (study.data is not None or not forced.levels):
         yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"
-    for platform in study.fmu.platforms:
+    yield from _fmu_problems(study.fmu, inputs, known)
+
+
+def _fmu_problems(fmu: FmuSettings, inputs: tuple[str, ...], sensors: tuple[str, ...]) -> Iterator[str]:
+    for platform in fmu.platforms:
         if platform not in PLATFORMS:
             yield unknown("[fmu] platforms:", "platform", platform, PLATFORMS)
-    for sensor in study.fmu.sensors or ():
-        if sensor not in known:
-            yield unknown("[fmu] sensors:", "sensor", sensor, known)
+    for sensor in fmu.sensors or ():
+        if sensor not in sensors:
+            yield unknown("[fmu] sensors:", "sensor", sensor, sensors)
+    for name, (low, high) in fmu.input_range.items():
+        if name not in inputs:
+            yield unknown("[fmu] input_range:", "load input", name, inputs)
+        elif not low <= 0.0 <= high or low == high:
+            yield f"[fmu] input_range: {name} starts at 0, its range must hold 0 and more; got [{low:g}, {high:g}]"
+    if fmu.icon is not None and not fmu.icon.is_file():
+        yield f"[fmu] icon: no such file; got '{fmu.icon}'"
+    elif fmu.icon is not None:
+        with fmu.icon.open("rb") as file:
+            is_png = file.read(len(PNG)) == PNG
+        if not is_png:
+            yield f"[fmu] icon: importers show PNG images only; got '{fmu.icon}'"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
-from romgen.settings.base import PositiveFrequency, PositiveTime, Settings, Time
+from romgen.settings.base import Acceleration, PositiveFrequency, PositiveTime, Settings, Time
 
 
 class LearnSettings(Settings):
@@ -51,6 +52,13 @@ class FmuSettings(Settings):
     coefficients: Literal["auto", "embedded", "file"] = "auto"
     fmi3: bool = False
     pythonfmu: bool = True
+    input_range: dict[str, tuple[Acceleration, Acceleration]] = Field(default_factory=dict)
+    icon: Path | None = None
+
+    @field_validator("icon")
+    @classmethod
+    def _beside_the_study(cls, icon: Path | None, info: ValidationInfo) -> Path | None:
+        return None if icon is None else (Path((info.context or {}).get("folder", ".")) / icon).resolve()
 
 
 class ReportSettings(Settings):

@@ -163,11 +163,40 @@ static void misuse(void)
     fmi3FreeInstance(NULL);
 }
 
+/* No logger, an event mode that is not offered, refused and failed steps, reset after an error, reading after the end. */
+static void importers(void)
+{
+    fmi3Boolean event, terminate, early;
+    double reached, ratio, limit = 1e-9;
+    const fmi3ValueReference hard_limit = VR_HARD_LIMIT, trust_ratio = VR_TRUST_RATIO;
+    n_message = 0;
+    CHECK(fmi3InstantiateCoSimulation("a", MODEL_GUID, NULL, fmi3False, fmi3False, fmi3True, fmi3False, NULL, 0, NULL,
+                                      message, NULL) == NULL && n_message == 1);
+    CHECK(fmi3InstantiateModelExchange("a", "{wrong}", NULL, fmi3False, fmi3False, NULL, NULL) == NULL);
+    fmi3Instance c = fmi3InstantiateCoSimulation("a", MODEL_GUID, NULL, fmi3False, fmi3False, fmi3False, fmi3False, NULL,
+                                                 0, NULL, NULL, NULL);
+    CHECK(c != NULL && fmi3DoStep(c, 0.0, H, fmi3True, &event, &terminate, &early, &reached) == fmi3Error);
+    start(c);
+    steps(c, 0, 3);
+    CHECK(fmi3DoStep(c, 3 * H, 0.0, fmi3True, &event, &terminate, &early, &reached) == fmi3Error && reached == 3 * H);
+    CHECK(fmi3DoStep(c, 3 * H, 1e9, fmi3True, &event, &terminate, &early, &reached) == fmi3Error && !early);
+    steps(c, 3, 3);
+    CHECK(fmi3SetFloat64(c, &hard_limit, 1, &limit, 1) == fmi3OK);
+    CHECK(fmi3DoStep(c, 6 * H, H, fmi3True, &event, &terminate, &early, &reached) == fmi3Error && reached == 6 * H);
+    CHECK(fmi3GetFloat64(c, &trust_ratio, 1, &ratio, 1) == fmi3OK && ratio > 0.0);
+    CHECK(fmi3Terminate(c) == fmi3Error && fmi3Reset(c) == fmi3OK);
+    start(c);
+    steps(c, 0, 3);
+    CHECK(fmi3Terminate(c) == fmi3OK && fmi3GetFloat64(c, &trust_ratio, 1, &ratio, 1) == fmi3OK);
+    fmi3FreeInstance(c);
+}
+
 int main(void)
 {
     co_simulation();
     model_exchange();
     misuse();
+    importers();
     printf("ok\n");
     return 0;
 }

@@ -14,6 +14,7 @@ from fmpy import read_model_description
 from romgen.errors import InputError
 from romgen.fmu.driver import Slave, fmpy_problems
 from romgen.fmu.export import export_fmu
+from romgen.fmu.export3 import export_fmi3
 from romgen.fmu.interface import build_interface
 from romgen.fmu.records import FmuExport, FmuInfo
 from romgen.reduced_model import ReducedModel
@@ -131,7 +132,7 @@ def test_the_information_reaches_description_documentation_and_icon(model: Reduc
     assert (description.description, description.author) == ("A panel <between> blocks", "A & B")
     assert (description.defaultExperiment.stopTime, description.defaultExperiment.stepSize) == ("0.25", "5e-05")
     (load, _) = [v for v in description.modelVariables if v.causality == "input"]
-    assert (float(load.min), float(load.max)) == (-50.0, 50.0)
+    assert (float(load.min), float(load.max), float(load.nominal)) == (-50.0, 50.0, 50.0)
     assert [v.name for v in description.modelVariables if v.unit == "m"] == ["upper_displacement"]
     with zipfile.ZipFile(tmp_path / "x.fmu") as archive:
         page = archive.read("documentation/index.html").decode()
@@ -139,3 +140,29 @@ def test_the_information_reaches_description_documentation_and_icon(model: Reduc
     assert "A panel &lt;between&gt; blocks" in page
     assert "three ring-downs" in page
     assert "2.35" in page or "2.34" in page
+
+
+def test_ranges_must_fit_the_inputs_and_hold_their_start_value(model: ReducedModel, tmp_path: Path) -> None:
+    for ranges, message in (
+        (((-1.0, 1.0),), "one range per input"),
+        (((1.0, 2.0), (-1.0, 1.0)), "base_acceleration must hold 0"),
+        (((-1.0, 1.0), (0.0, 0.0)), "shaker force must hold 0"),
+        (((-1.0, float("inf")), (-1.0, 1.0)), "base_acceleration must hold 0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            export_fmu(model, tmp_path / "x.fmu", SOURCE_ONLY, info=FmuInfo(input_range=ranges))
+
+
+def test_units_of_all_kinds_carry_icon_and_ranges(
+    pythonfmu_unit: FmuExport, model: ReducedModel, tmp_path: Path
+) -> None:
+    info = FmuInfo(input_range=((-50.0, 40.0), (-2.0, 2.0)))
+    export_fmu(model, tmp_path / "two.fmu", SOURCE_ONLY, info=info)
+    export_fmi3(model, tmp_path / "three.fmu", SOURCE_ONLY, info=info)
+    places = ((tmp_path / "two.fmu", "model.png"), (tmp_path / "three.fmu", "terminalsAndIcons/icon.png"))
+    for path, name in (*places, (Path(pythonfmu_unit.path), "model.png")):
+        with zipfile.ZipFile(path) as archive:
+            assert archive.read(name).startswith(b"\x89PNG\r\n\x1a\n")
+    for path, _ in places:
+        loads = [v for v in read_model_description(path).modelVariables if v.causality == "input"]
+        assert [(float(v.min), float(v.max)) for v in loads] == [(-50.0, 40.0), (-2.0, 2.0)]

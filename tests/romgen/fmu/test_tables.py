@@ -180,7 +180,11 @@ def test_paths_of_windows(run_cc: Callable[..., None], tmp_path: Path) -> None:
         "file://server/share/a": "//server/share/a/f",
         "file:////server/share": "//server/share/f",
         "file://localhost/C:/a": "C:/a/f",
-        "C:\\a%20b\\": "C:\\a%20b\\/f",
+        "C:\\a%20b\\": "C:\\a%20b\\f",
+        "file:///C:\\a%20b\\c": "C:\\a b\\c/f",
+        "\\\\?\\C:\\a b\\c": "\\\\?\\C:\\a b\\c\\f",
+        "\\\\server\\share/": "\\\\server\\share/f",
+        "file:///C:/%C3%BC/": "C:/\u00fc/f",
         "file:///C:/50%/x": "C:/50%/x/f",
     }
     result = subprocess.run([tmp_path / "paths", *given], capture_output=True, text=True, check=True)
