@@ -15,6 +15,7 @@ from romgen.manifold import Manifold, ManifoldFit
 from romgen.normal_form import NormalFormFit, fit_normal_form
 from romgen.order_selection import OrderTable, choose_order
 from romgen.polynomial import PolynomialMap, exponents
+from romgen.reduced_dynamics import LinearPart
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
@@ -75,6 +76,7 @@ def learn(
     settings: LearnSettings,
     name: str,
     loads: Loads | None = None,
+    known: LinearPart | None = None,
 ) -> Learned:
     """Learn the extended normal form of the training trajectories and test it on all.
 
@@ -87,18 +89,19 @@ def learn(
     settings : table [learn].
     name : identifier of the model.
     loads : load inputs; only with modal fields, None makes a model without inputs.
+    known : linear part of the master modes to keep; only with modal fields, None fits it.
 
     Raises
     ------
-    InputError : no training trajectory, different sensors, or loads without modal fields.
+    InputError : no training trajectory, different sensors, or loads or a linear part without modal fields.
     NumericalError : the data are not those of decaying oscillations.
     """
-    _check(training, validation, loads)
+    _check(training, validation, loads, known)
     m = len(settings.master_modes)
     chart = None if _is_modal(training) else learn_sensor_chart(training, m)
     reduced = [reduced_trajectory(trajectory, chart, settings) for trajectory in training]
-    orders = choose_order(reduced, settings)
-    fit = best_fit(reduced, orders, settings)
+    orders = choose_order(reduced, settings, known)
+    fit = best_fit(reduced, orders, settings, known)
     model = assemble(name, fit, reduced, settings, training[0].sensors, loads)
     full = _full_field(training, reduced, model, settings)
     held_out = [reduced_trajectory(trajectory, chart, settings) for trajectory in validation]
@@ -118,10 +121,12 @@ def learn(
     )
 
 
-def best_fit(training: Sequence[ReducedTrajectory], table: OrderTable, settings: LearnSettings) -> NormalFormFit:
+def best_fit(
+    training: Sequence[ReducedTrajectory], table: OrderTable, settings: LearnSettings, known: LinearPart | None = None
+) -> NormalFormFit:
     """Return the normal form of all training data by the order and method of the table."""
     method = fit_normal_form if table.method == "conjugacy" else fit_on_trajectories
-    return method(training, table.order, settings.internal_resonance, settings.ridge)
+    return method(training, table.order, settings.internal_resonance, settings.ridge, known)
 
 
 def reduced_trajectory(trajectory: Trajectory, chart: SensorChart | None, settings: LearnSettings) -> ReducedTrajectory:
@@ -202,7 +207,12 @@ def _columns(trajectory: Trajectory, settings: LearnSettings) -> list[int]:
     return list(range(m)) if recorded == m else [mode - 1 for mode in settings.master_modes]
 
 
-def _check(training: Sequence[Trajectory], validation: Sequence[Trajectory], loads: Loads | None) -> None:
+def _check(
+    training: Sequence[Trajectory],
+    validation: Sequence[Trajectory],
+    loads: Loads | None,
+    known: LinearPart | None,
+) -> None:
     if not training:
         raise InputError("no training trajectory", where="learn")
     for trajectory in [*training, *validation]:
@@ -210,3 +220,5 @@ def _check(training: Sequence[Trajectory], validation: Sequence[Trajectory], loa
             raise InputError("other sensors", where=f"trajectory '{trajectory.name}'", value=trajectory.sensors)
     if loads is not None and not _is_modal(training):
         raise InputError("modal loads need trajectories with modal fields", where="learn", value=loads.inputs)
+    if known is not None and not _is_modal(training):
+        raise InputError("a linear part needs trajectories with modal fields", where="learn", value=known.omega)

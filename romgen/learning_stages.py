@@ -5,8 +5,11 @@ from __future__ import annotations
 import logging
 from typing import Any
 
+import numpy as np
+
 from romgen.learn import Learned, Loads, learn
 from romgen.model_stages import recorded
+from romgen.reduced_dynamics import LinearPart
 from romgen.reduced_model import ReducedModel
 from romgen.settings import Study
 from romgen.stage import Context, Stage
@@ -24,7 +27,9 @@ def learning_stages(study: Study) -> tuple[Stage, ...]:
 def learn_model(context: Context) -> Learned:
     """Learn from the training trajectories; judge by the validation ones."""
     study, trajectories = context.study, recorded(context)
-    learned = learn(trajectories.training, trajectories.validation, study.learn, study.name, _loads(context))
+    learned = learn(
+        trajectories.training, trajectories.validation, study.learn, study.name, _loads(context), _linear(context)
+    )
     log.info("%s", learned.choice)
     for note in learned.notes:
         log.warning("%s", note)
@@ -38,6 +43,15 @@ def _loads(context: Context) -> Loads | None:
     modes = context.record("modes", Modes)
     rows = [mode - 1 for mode in context.study.learn.master_modes]
     return Loads(modes.inputs, modes.input_units, modes.modal_load[rows]) if modes.inputs else None
+
+
+def _linear(context: Context) -> LinearPart | None:
+    """Return frequency and damping of the master modes, or None where they are fitted."""
+    if context.study.data is not None or context.study.learn.linear_part == "fitted":
+        return None
+    modes = context.record("modes", Modes)
+    rows = [mode - 1 for mode in context.study.learn.master_modes]
+    return LinearPart(2.0 * np.pi * modes.frequency_hz[rows], modes.damping_ratio[rows])
 
 
 def learned(context: Context) -> Learned:

@@ -13,7 +13,7 @@ from romgen.chart import ReducedTrajectory
 from romgen.conjugacy import ConjugacyFit, fit_conjugacy, homological_start
 from romgen.errors import NumericalError
 from romgen.polynomial import PolynomialMap, evaluate, exponents, monomials, zeta
-from romgen.reduced_dynamics import ReducedDynamics, fit_reduced_dynamics, modal_samples
+from romgen.reduced_dynamics import LinearPart, ReducedDynamics, fit_reduced_dynamics, modal_samples
 from romgen.regression import ridge_fit
 from romgen.resonance import ResonanceTable, automatic_resonance, gap_resonance, integer_resonance, trivial_resonance
 from romgen.substitution import substitute_linear
@@ -53,7 +53,11 @@ class NormalFormFit:
 
 
 def fit_normal_form(
-    training: Sequence[ReducedTrajectory], order: int, internal_resonance: Resonance, ridge: float
+    training: Sequence[ReducedTrajectory],
+    order: int,
+    internal_resonance: Resonance,
+    ridge: float,
+    known: LinearPart | None = None,
 ) -> NormalFormFit:
     """Fit R, keep the resonant terms, minimise the conjugacy cost with growing order, invert the chart.
 
@@ -63,12 +67,13 @@ def fit_normal_form(
     order : f, largest degree.
     internal_resonance : integers r_j, () for none, "auto" (integers) or "gap" (by size).
     ridge : of every regression and of A and B.
+    known : linear part to keep; None fits it too.
 
     Raises
     ------
     NumericalError : the linear part does not decay or the cost is not finite.
     """
-    dynamics = fit_reduced_dynamics(training, order, ridge)
+    dynamics = fit_reduced_dynamics(training, order, ridge, known)
     samples = [modal_samples(dynamics, trajectory) for trajectory in training]
     q, q_dot = np.vstack([s[0] for s in samples]), np.vstack([s[1] for s in samples])
     table = resonance_table(dynamics.eigenvalues, order, internal_resonance)

@@ -15,7 +15,7 @@ from romgen.initial_window import fitted_start
 from romgen.metrics import nmte_percent
 from romgen.normal_form import NormalFormFit, fit_normal_form
 from romgen.polynomial import PolynomialMap
-from romgen.reduced_dynamics import modal_samples
+from romgen.reduced_dynamics import LinearPart, modal_samples
 from romgen.reduced_model import ReducedModel
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate
@@ -75,7 +75,9 @@ class _Trial:
         return float(self.errors.mean()) if self.errors.size else float("inf")
 
 
-def choose_order(training: Sequence[ReducedTrajectory], settings: LearnSettings) -> OrderTable:
+def choose_order(
+    training: Sequence[ReducedTrajectory], settings: LearnSettings, known: LinearPart | None = None
+) -> OrderTable:
     """Return order and method by two-fold cross-validation over alternating blocks of time, training data only.
 
     A given order leaves the method to choose. Fits on trajectories are tried where the conjugacy fit misses held-out
@@ -86,9 +88,9 @@ def choose_order(training: Sequence[ReducedTrajectory], settings: LearnSettings)
     NumericalError : no order can be fitted, or all lose every block.
     """
     orders = CANDIDATES if settings.order == "auto" else (int(settings.order),)
-    trials, best = _improving(_conjugacy_trials(training, orders, settings))
+    trials, best = _improving(_conjugacy_trials(training, orders, (settings, known)))
     if best.mean > GOOD_PERCENT and is_long_enough(training):
-        more, other = _improving(_trajectory_trials(training, orders, settings))
+        more, other = _improving(_trajectory_trials(training, orders, (settings, known)))
         trials += more
         best = min(best, other, key=lambda trial: trial.mean)
     if not best.mean < LOST_PERCENT:
@@ -119,14 +121,15 @@ def _improving(trials: Iterator[_Trial]) -> tuple[list[_Trial], _Trial]:
 
 
 def _conjugacy_trials(
-    training: Sequence[ReducedTrajectory], orders: Sequence[int], settings: LearnSettings
+    training: Sequence[ReducedTrajectory], orders: Sequence[int], given: tuple[LearnSettings, LinearPart | None]
 ) -> Iterator[_Trial]:
+    settings, known = given
     for order in orders:
         errors: list[float] = []
         for kept in _folds(training):
             seen = [block for r, keep in zip(training, kept, strict=True) for block in _runs(r, keep)]
             try:
-                fit = fit_normal_form(seen, order, settings.internal_resonance, settings.ridge)
+                fit = fit_normal_form(seen, order, settings.internal_resonance, settings.ridge, known)
             except NumericalError:
                 errors = []
                 break
@@ -135,12 +138,13 @@ def _conjugacy_trials(
 
 
 def _trajectory_trials(
-    training: Sequence[ReducedTrajectory], orders: Sequence[int], settings: LearnSettings
+    training: Sequence[ReducedTrajectory], orders: Sequence[int], given: tuple[LearnSettings, LinearPart | None]
 ) -> Iterator[_Trial]:
+    settings, known = given
     folds = _folds(training)
     steps = sorted({*growing_orders(orders[0]), *orders})
-    given = (settings.internal_resonance, settings.ridge)
-    fits = [growing_fits(training, kept, steps, given) for kept in folds]
+    options = (settings.internal_resonance, settings.ridge, known)
+    fits = [growing_fits(training, kept, steps, options) for kept in folds]
     for order in steps:
         try:
             grown = [next(fit) for fit in fits]

@@ -37,7 +37,31 @@ class ReducedDynamics:
     inverse: ComplexArray = field(metadata={"unit": "1", "axes": "mode,coordinate"})
 
 
-def fit_reduced_dynamics(training: Sequence[ReducedTrajectory], order: int, ridge: float) -> ReducedDynamics:
+@dataclass(frozen=True)
+class LinearPart:
+    """Known modes: eta_j'' = -omega_j^2 eta_j - 2 zeta_j omega_j eta_j' at small amplitude.
+
+    A polynomial of finite order bends its linear part towards the motions of large amplitude; where the modes of a
+    finite-element model are known, the limit of small amplitude is not left to the regression.
+
+    Attributes
+    ----------
+    omega : (m,) rad/s, ascending; damping_ratio : (m,).
+    """
+
+    omega: FloatArray = field(metadata={"unit": "rad/s", "axes": "mode"})
+    damping_ratio: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
+
+    def rows(self, scale: FloatArray) -> FloatArray:
+        """Return the rows (m, 2m) of w'' for w = y / scale, 1/s."""
+        m = len(self.omega)
+        stiffness = np.diag(-(self.omega**2) * scale[:m] / scale[m:])
+        return np.hstack([stiffness, np.diag(-2.0 * self.damping_ratio * self.omega)])
+
+
+def fit_reduced_dynamics(
+    training: Sequence[ReducedTrajectory], order: int, ridge: float, known: LinearPart | None = None
+) -> ReducedDynamics:
     """Fit eta'' = r(eta, eta') by ridge regression; eta' = eta' needs no fit.
 
     Parameters
@@ -45,6 +69,7 @@ def fit_reduced_dynamics(training: Sequence[ReducedTrajectory], order: int, ridg
     training : trajectories in reduced coordinates.
     order : f, largest degree.
     ridge : as in ``regression.ridge_solve``.
+    known : linear part to keep; None fits it too.
 
     Raises
     ------
@@ -58,7 +83,10 @@ def fit_reduced_dynamics(training: Sequence[ReducedTrajectory], order: int, ridg
     _check_enough(phi, order)
     R = np.zeros((2 * m, len(table)))
     R[np.arange(m), m + np.arange(m)] = scale[m:] / scale[:m]
-    R[m:] = ridge_fit(phi, y_dot[:, m:] / scale[m:], ridge)
+    first = 0 if known is None else 2 * m
+    if known is not None:
+        R[m:, :first] = known.rows(scale)
+    R[m:, first:] = ridge_fit(phi[:, first:], y_dot[:, m:] / scale[m:] - phi[:, :first] @ R[m:, :first].T, ridge)
     eigenvalues, V = decaying_modes(R[:, : 2 * m])
     amplitude = np.abs((y / scale) @ np.linalg.inv(V).T).max(axis=0)
     V = V * (amplitude / LARGEST_AMPLITUDE)

@@ -64,7 +64,7 @@ class RefinedDynamics:
 
     Attributes
     ----------
-    eigenvalues : (m,) Lambda, 1/s; reference : (m,) the values they are tied to.
+    eigenvalues : (m,) Lambda, 1/s; reference : (m,) the values they are tied to; keep_linear : they stay there.
     amplitude : (m,) corner of the data, largest abs(z_j) over all motions.
     exponents : (n_term, 2m) degree >= 2; resonant : (m, n_term) terms of B; B : (m, n_term) 1/s.
     output : terms of the displacement; C : (m, n_output) their coefficients; rest : (n_motion, m) rest positions.
@@ -81,6 +81,7 @@ class RefinedDynamics:
     C: ComplexArray = field(metadata={"unit": "unit of eta", "axes": "mode,term"})
     rest: FloatArray = field(metadata={"unit": "unit of eta", "axes": "motion,mode"})
     cost: float = float("inf")
+    keep_linear: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,7 @@ def refine(
     for _ in range(steps):
         accepted = False
         for _ in range(MAX_REJECTIONS):
-            H = here.hessian + damping * np.diag(np.maximum(np.diag(here.hessian), 1e-30))
-            change: FloatArray = -np.linalg.solve(H, here.gradient).astype(np.float64)
+            change = _step(here, damping)
             trial_model, trial_segments = _moved(here.model, segments, change)
             cost = _cost(trial_model, trial_segments, max_step)
             if cost < here.model.cost:
@@ -125,6 +125,15 @@ def refine(
         if gain < decrease:
             break
     return here.model, segments
+
+
+def _step(here: _Linearised, damping: float) -> FloatArray:
+    """Return the change of all unknowns; kept eigenvalues do not change."""
+    H = here.hessian + damping * np.diag(np.maximum(np.diag(here.hessian), 1e-30))
+    first = 2 * len(here.model.eigenvalues) if here.model.keep_linear else 0
+    change = np.zeros(len(H))
+    change[first:] = -np.linalg.solve(H[first:, first:], here.gradient[first:])
+    return change
 
 
 def regrown(model: RefinedDynamics, table: ResonanceTable) -> RefinedDynamics:

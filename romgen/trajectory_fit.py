@@ -15,7 +15,7 @@ from romgen.metrics import analytic_signal
 from romgen.normal_form import NormalFormFit, Resonance, resonance_table
 from romgen.output_map import output_map
 from romgen.polynomial import monomials, zeta
-from romgen.reduced_dynamics import ReducedDynamics, fit_reduced_dynamics, modal_samples
+from romgen.reduced_dynamics import LinearPart, ReducedDynamics, fit_reduced_dynamics, modal_samples
 from romgen.refined_chart import refined_normal_form
 from romgen.refinement import RefinedDynamics, Segment, refine, regrown
 from romgen.regression import ridge_fit
@@ -49,7 +49,11 @@ def _periods(r: ReducedTrajectory) -> float:
 
 
 def fit_on_trajectories(
-    training: Sequence[ReducedTrajectory], order: int, internal_resonance: Resonance, ridge: float
+    training: Sequence[ReducedTrajectory],
+    order: int,
+    internal_resonance: Resonance,
+    ridge: float,
+    known: LinearPart | None = None,
 ) -> NormalFormFit:
     """Return the last of ``growing_fits`` up to ``order``, every sample counted.
 
@@ -58,13 +62,14 @@ def fit_on_trajectories(
     training : uniform, at least 20 periods long.
     order, internal_resonance : as in ``normal_form.fit_normal_form``.
     ridge : of the linear part and of the inverse chart; refinement has priors of its own.
+    known : linear part to keep; None fits it too.
 
     Raises
     ------
     NumericalError : the linear part does not decay.
     """
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
-    return list(growing_fits(training, everything, growing_orders(order), (internal_resonance, ridge)))[-1]
+    return list(growing_fits(training, everything, growing_orders(order), (internal_resonance, ridge, known)))[-1]
 
 
 def growing_orders(order: int) -> list[int]:
@@ -76,7 +81,7 @@ def growing_fits(
     training: Sequence[ReducedTrajectory],
     kept: Sequence[BoolArray],
     orders: Sequence[int],
-    settings: tuple[Resonance, float],
+    settings: tuple[Resonance, float, LinearPart | None],
 ) -> Iterator[NormalFormFit]:
     """Start from band-passed modal coordinates at the first order, refine, grow to the next, refine, ..
 
@@ -88,19 +93,18 @@ def growing_fits(
     training : uniform, at least 20 periods long.
     kept : (n_time,) per trajectory, samples that count; simulation passes through the others.
     orders : increasing.
-    settings : internal resonance; ridge of the linear part and of the inverse chart.
+    settings : internal resonance; ridge of the linear part and of the inverse chart; linear part to keep or None.
 
     Yields
     ------
     The normal form of each order.
     """
-    internal_resonance, ridge = settings
+    internal_resonance, ridge, known = settings
     seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
-    dynamics = fit_reduced_dynamics(seen, min(orders[0], START_ORDER), ridge)
+    dynamics = fit_reduced_dynamics(seen, min(orders[0], START_ORDER), ridge, known)
     signals = [_signals(dynamics, r) for r in training]
-    model = _start(
-        dynamics, training, (signals, kept), resonance_table(dynamics.eigenvalues, orders[0], internal_resonance)
-    )
+    table = resonance_table(dynamics.eigenvalues, orders[0], internal_resonance)
+    model = _start(dynamics, training, (signals, kept), table, keep_linear=known is not None)
     max_step = 2.0 * np.pi / (20.0 * float(dynamics.eigenvalues.imag.max()))
     shots = _segments(dynamics, training, (signals, kept), SHOTS)
     whole = _segments(dynamics, training, (signals, kept), 1)
@@ -140,10 +144,15 @@ def _start(
     training: Sequence[ReducedTrajectory],
     signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
     table: ResonanceTable,
+    *,
+    keep_linear: bool,
 ) -> RefinedDynamics:
-    """Return Lambda and B of the band-passed signals, the linear displacement of the modes, and no further terms."""
+    """Return Lambda and B of the band-passed signals, the linear displacement of the modes, and no further terms.
+
+    ``keep_linear`` keeps the eigenvalues of ``dynamics`` here and in the refinement.
+    """
     m = len(dynamics.eigenvalues)
-    eigenvalues, B = _rates(dynamics, training, signals, table)
+    eigenvalues, B = _rates(dynamics, training, signals, table, keep_linear=keep_linear)
     # w = 2 Re(V q), so eta_j = s_j Re(2 V_jj z_j) and the rest
     linear = 2.0 * dynamics.scale[:m] * np.diag(dynamics.vectors[:m])
     output = output_map(linear.astype(np.complex128), table)
@@ -151,6 +160,7 @@ def _start(
     return RefinedDynamics(
         eigenvalues=eigenvalues,
         reference=eigenvalues,
+        keep_linear=keep_linear,
         amplitude=amplitude,
         exponents=table.exponents,
         resonant=table.resonant,
@@ -166,6 +176,8 @@ def _rates(
     training: Sequence[ReducedTrajectory],
     signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
     table: ResonanceTable,
+    *,
+    keep_linear: bool,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return Lambda and B of z' = Lambda z + B phi(z) by regression with weights 1/(abs(z_j) + floor)."""
     z, rate = [], []
@@ -180,12 +192,16 @@ def _rates(
         rate.append((derivative[:, :m] + 1j * derivative[:, m:])[inner])
     Z, Z_dot = np.vstack(z), np.vstack(rate)
     B = np.zeros(table.resonant.shape, dtype=np.complex128)
-    eigenvalues = np.zeros(Z.shape[1], dtype=np.complex128)
+    eigenvalues = dynamics.eigenvalues.copy()
     for j, kept in enumerate(table.resonant):
         weight = 1.0 / (np.abs(Z[:, j : j + 1]) + AMPLITUDE_FLOOR * np.abs(Z[:, j]).max())
-        columns = np.hstack([Z[:, j : j + 1], monomials(zeta(Z), table.exponents[kept])])
-        row = ridge_fit(columns * weight, Z_dot[:, j : j + 1] * weight, 0.0)[0]
-        eigenvalues[j], B[j, kept] = row[0], row[1:]
+        own, terms = Z[:, j : j + 1] * weight, monomials(zeta(Z), table.exponents[kept]) * weight
+        rate_j = Z_dot[:, j : j + 1] * weight
+        if keep_linear:
+            B[j, kept] = ridge_fit(terms, rate_j - eigenvalues[j] * own, 0.0)[0]
+        else:
+            row = ridge_fit(np.hstack([own, terms]), rate_j, 0.0)[0]
+            eigenvalues[j], B[j, kept] = row[0], row[1:]
     return eigenvalues, B
 
 

@@ -18,6 +18,7 @@ class LearnSettings(Settings):
     order: int | Literal["auto"] = "auto"
     geometry_order: int | None = Field(default=None, ge=1, le=9)
     ridge: float = Field(default=1e-8, ge=0.0)
+    linear_part: Literal["modes", "fitted"] = "modes"
     start_time: Time = 0.0
 
 

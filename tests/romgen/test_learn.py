@@ -11,6 +11,7 @@ import pytest
 from romgen.errors import InputError
 from romgen.learn import Loads, learn
 from romgen.polar_form import polar_latex, polar_text
+from romgen.reduced_dynamics import LinearPart
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate
 from romgen.trajectory import Trajectory
@@ -93,6 +94,22 @@ def test_loads_need_modal_fields(motions: dict[str, Trajectory]) -> None:
     loads = Loads(("f",), ("N",), np.ones((2, 1)))
     with pytest.raises(InputError, match="modal loads need"):
         learn(training(motions), [], SETTINGS, "lab", loads)
+
+
+def test_a_linear_part_needs_modal_fields(motions: dict[str, Trajectory]) -> None:
+    known = LinearPart(np.array([60.0, 150.0]), np.array([0.03, 0.02]))
+    with pytest.raises(InputError, match="linear part needs"):
+        learn(training(motions), [], SETTINGS, "lab", known=known)
+
+
+def test_known_modes_are_the_linear_part_of_the_model() -> None:
+    """Roots -2.1 + 60i are not those of the data; they stay."""
+    motions = [modal_decay("one", (1.0, 0.2)), modal_decay("two", (0.3, 0.8))]
+    settings = LearnSettings(internal_resonance=(), order=3)
+    roots = np.array([-2.1 + 60.0j, -3.0 + 150.0j])
+    known = LinearPart(np.abs(roots), -roots.real / np.abs(roots))
+    learned = learn(motions, [], settings, "fe", known=known)
+    assert learned.model.eigenvalues == pytest.approx(roots, rel=1e-12)
 
 
 def test_polar_form_of_the_example() -> None:
