@@ -8,25 +8,33 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from romgen.fmu.compilers import host_platform
+from romgen.fmu.export3 import FOLDERS
 from romgen.fmu.records import LevelRow
-from romgen.fmu.templates import runtime_sources
+from romgen.fmu.templates import runtime_sources, runtime_sources3
 
-N_FUNCTION = 44
 NEWEST_GLIBC = 2.17
 
 
-def binary_rows(folder: Path) -> Iterator[LevelRow]:
+def host_binaries(folder: Path, version: str) -> Path:
+    """Where the binary for this machine lies, if there is one; ``version`` is that of FMI."""
+    return folder / "binaries" / (host_platform() if version == "2.0" else FOLDERS[host_platform()])
+
+
+def binary_rows(folder: Path, version: str) -> Iterator[LevelRow]:
     """Functions that are exported, and the newest C library that is asked for (linux only).
 
     Parameters
     ----------
     folder : the unpacked unit, with a binary for this machine.
+    version : of FMI, which declares 44 functions in 2.0 and 75 in 3.0.
     """
-    library = next((folder / "binaries" / host_platform()).iterdir())
+    library = next(host_binaries(folder, version).iterdir())
     loaded = ctypes.CDLL(str(library))
-    names = re.findall(r"FMI2_Export\s+\w+TYPE\s+(\w+);", runtime_sources()["fmi2Functions.h"].decode())
+    header = runtime_sources()["fmi2Functions.h"] if version == "2.0" else runtime_sources3()["fmi3Functions.h"]
+    names = re.findall(r"FMI[23]_Export\s+\w+TYPE\s+(\w+);", header.decode())
     found = sum(hasattr(loaded, name) for name in names)
-    yield LevelRow("L0", f"functions of FMI 2.0 in {library.name}, loaded without an importer", found, N_FUNCTION, 0.0)
+    check = f"functions of FMI {version} in {library.name}, loaded without an importer"
+    yield LevelRow("L0", check, found, len(names), 0.0)
     versions = [int(v) for v in re.findall(rb"GLIBC_2\.(\d+)", library.read_bytes())]
     if versions:
         newest = 2.0 + max(versions) / 100.0

@@ -12,15 +12,17 @@ from typing import Any, Literal
 import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Model, FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.validation import validate_fmu
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError, NumericalError
+from romgen.fmu.driver3 import Model3, Slave3, elements, float_lengths
 from romgen.fmu.records import FmuReplay
 from romgen.fmu.sensor_variables import BASE_MOTION
 
 Hold = Literal["constant", "linear"]
+Kind = Literal["CoSimulation", "ModelExchange"]
 
 
 @dataclass(frozen=True)
@@ -38,9 +40,12 @@ class References:
 
 @dataclass(frozen=True)
 class Slave:
-    """An instantiated unit: fmpy's object, its references, and the messages it has logged so far."""
+    """An instantiated unit: fmpy's object, its references, and the messages it has logged so far.
 
-    fmu: FMU2Slave
+    ``fmu`` is fmpy's FMU2Slave, or for a unit of FMI 3.0 what takes the same calls.
+    """
+
+    fmu: Any
     references: References
     messages: list[str]
 
@@ -71,15 +76,9 @@ def opened_slave(path: Path | str) -> Iterator[Slave]:
     with unpacked(path) as folder:
         description = read_model_description(folder, validate=False)
         messages: list[str] = []
-        callbacks = collecting_callbacks(messages)
         try:
-            fmu = FMU2Slave(
-                guid=description.guid,
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                unzipDirectory=folder,
-                instanceName="instance",
-            )
-            fmu.instantiate(callbacks=callbacks)
+            fmu = new_unit(description, folder, "CoSimulation")
+            fmu.instantiate(callbacks=collecting_callbacks(messages))
         except Exception as error:  # fmpy raises plain Exception for a missing library and a failed instantiation
             detail = "; ".join([str(error), *messages])
             raise InputError("the unit cannot be instantiated", where=str(path), value=detail) from error
@@ -87,6 +86,29 @@ def opened_slave(path: Path | str) -> Iterator[Slave]:
             yield Slave(fmu, references(description.modelVariables), messages)
         finally:
             fmu.freeInstance()
+
+
+def new_unit(description: Any, folder: str, kind: Kind, guid: str | None = None) -> Any:
+    """fmpy's object for a unpacked unit of FMI 2.0, or the like for one of FMI 3.0; not instantiated.
+
+    Parameters
+    ----------
+    description : what fmpy read from it.
+    folder : where it lies.
+    kind : interface.
+    guid : another identifier than its own.
+    """
+    interface = description.coSimulation if kind == "CoSimulation" else description.modelExchange
+    names = {
+        "guid": guid or description.guid,
+        "modelIdentifier": interface.modelIdentifier,
+        "unzipDirectory": folder,
+        "instanceName": "instance",
+    }
+    if description.fmiVersion.startswith("3"):
+        variables = description.modelVariables
+        return (Slave3 if kind == "CoSimulation" else Model3)(float_lengths(variables), load_inputs(variables), **names)
+    return (FMU2Slave if kind == "CoSimulation" else FMU2Model)(**names)
 
 
 def replay(
@@ -159,19 +181,40 @@ def collecting_callbacks(messages: list[str]) -> fmi2CallbackFunctions:
 def references(variables: list[Any]) -> References:
     """References by role: states are what a derivative points to, sensors are relative outputs in m and m/s."""
 
+    if any(v.type == "Float64" for v in variables):
+        return _references3(variables)
+
     def outputs(unit: str) -> tuple[int, ...]:
         return tuple(v.valueReference for v in reals if v.unit == unit and v.name in relative)
 
     reals = [v for v in variables if v.type == "Real"]
     named = {v.name for v in reals if v.causality == "output"}
     relative = {name for name in named if name.removesuffix("_absolute") not in named - {name}}
-    base = {name for name, _ in BASE_MOTION}
     return References(
         states=tuple(v.derivative.valueReference for v in reals if v.derivative is not None),
         rates=tuple(v.valueReference for v in reals if v.derivative is not None),
-        inputs=tuple(v.valueReference for v in reals if v.causality == "input" and v.name not in base),
+        inputs=load_inputs(variables),
         displacement=outputs("m"),
         velocity=outputs("m/s"),
         trust_ratio=next(v.valueReference for v in reals if v.name == "trust_ratio"),
         max_internal_step=next(v.valueReference for v in reals if v.name == "max_internal_step"),
+    )
+
+
+def load_inputs(variables: list[Any]) -> tuple[int, ...]:
+    """References of the inputs that drive the model."""
+    base = {name for name, _ in BASE_MOTION}
+    return tuple(v.valueReference for v in variables if v.causality == "input" and v.name not in base)
+
+
+def _references3(variables: list[Any]) -> References:
+    """The same of a unit of FMI 3.0, whose states and sensors are arrays."""
+    return References(
+        states=elements(variables, "z"),
+        rates=elements(variables, "der_z"),
+        inputs=load_inputs(variables),
+        displacement=elements(variables, "displacement"),
+        velocity=elements(variables, "velocity"),
+        trust_ratio=elements(variables, "trust_ratio")[0],
+        max_internal_step=elements(variables, "max_internal_step")[0],
     )

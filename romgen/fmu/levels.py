@@ -10,9 +10,8 @@ import numpy as np
 from fmpy import read_model_description, simulate_fmu
 
 from romgen.arrays import FloatArray
-from romgen.fmu.binary_checks import binary_rows
+from romgen.fmu.binary_checks import binary_rows, host_binaries
 from romgen.fmu.check import random_input, replay_difference
-from romgen.fmu.compilers import host_platform
 from romgen.fmu.driver import Hold, fmpy_problems, replay, unpacked
 from romgen.fmu.kernel_checks import START, kernel_rows
 from romgen.fmu.model_exchange import replay_model_exchange
@@ -21,6 +20,7 @@ from romgen.fmu.records import FmuLevels, LevelRow
 from romgen.fmu.rules import rule_problems
 from romgen.fmu.sensor_variables import BASE_MOTION
 from romgen.fmu.state_checks import state_rows
+from romgen.fmu.unit_facts import unit_facts
 from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
 from romgen.simulate import simulate_reference
@@ -33,7 +33,7 @@ def _silent(fraction: float, text: str) -> None:
 
 
 def validate_unit(path: Path, report: Report = _silent) -> FmuLevels:
-    """Check a unit from its file alone: structure for any FMI 2.0 unit, all levels for one that romgen exported.
+    """Check a unit from its file alone: structure for any unit of FMI 2.0 or 3.0, all levels for one of romgen.
 
     The Python model is read from resources/rom.json in the unit. Levels are L0 structure and binary, L1 equations and
     integrator, L2 states and use, L3 importers and treatment of inputs.
@@ -45,20 +45,21 @@ def validate_unit(path: Path, report: Report = _silent) -> FmuLevels:
 
     Raises
     ------
-    InputError : the file is no FMI 2.0 unit, or its model cannot be read.
+    InputError : the file is no unit, or its model cannot be read.
     """
     report(0.0, "L0")
-    problems, broken = fmpy_problems(path), rule_problems(path)
+    broken, version = rule_problems(path), unit_facts(path).fmi_version
+    problems = fmpy_problems(path)
     rows = [
         LevelRow("L0", "problems that fmpy's validator reports", len(problems), 0.0, 0.0),
-        LevelRow("L0", "rules of FMI 2.0 that are broken", len(broken), 0.0, 0.0),
+        LevelRow("L0", f"rules of FMI {version} that are broken", len(broken), 0.0, 0.0),
     ]
     found, notes = (*problems, *broken), [NOT_HERE]
     model = model_in_unit(path)
     with unpacked(path) as folder:
-        has_binary = (Path(folder) / "binaries" / host_platform()).is_dir()
+        has_binary = host_binaries(Path(folder), version).is_dir()
         if model is not None and has_binary and _is_native(path):
-            rows += binary_rows(Path(folder))
+            rows += binary_rows(Path(folder), version)
             rows += _measured(path, model, report)
         else:
             notes.insert(
@@ -97,12 +98,12 @@ def _input_rows(path: Path, model: ReducedModel, step: float) -> Iterator[LevelR
         [tuple(row) for row in np.column_stack([t, u])], dtype=[(n, float) for n in ("time", *_inputs(path))]
     )
     run = replay(path, t, np.zeros_like(z0), u)
-    states = [v.derivative.name for v in _variables(path) if v.derivative is not None]
+    states = list(dict.fromkeys(v.derivative.name for v in _variables(path) if v.derivative is not None))
     simulated = simulate_fmu(
         str(path), validate=False, fmi_type="CoSimulation", stop_time=float(t[-1]), output_interval=step,
         input=signals, start_values={"warn_on_crossing": False}, logger=lambda *_: None, output=states,
     )  # fmt: skip
-    rows = simulated.view(np.float64).reshape(len(simulated), -1)[: len(t), 1:]
+    rows = np.column_stack([simulated[name] for name in states])[: len(t)]
     apart = float(np.max(np.abs(rows - run.state[: len(rows)])) / np.max(np.abs(run.state)))
     yield LevelRow("L3", "fmpy's simulate_fmu against the step-by-step driver, held input", apart, 0.0, 1e-9)
     ramp = u[1] / t[-1]

@@ -5,15 +5,15 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from fmpy import read_model_description
-from fmpy.fmi2 import FMU2Model
 from scipy.integrate import solve_ivp
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import NumericalError
-from romgen.fmu.driver import References, collecting_callbacks, references, unpacked
+from romgen.fmu.driver import References, collecting_callbacks, new_unit, references, unpacked
 from romgen.fmu.records import FmuReplay
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -27,7 +27,7 @@ def replay_model_exchange(
     *,
     rtol: float = 1e-12,
 ) -> FmuReplay:
-    """Integrate a unit by DOP853, calling fmi2SetTime, fmi2SetContinuousStates, fmi2SetReal, fmi2GetDerivatives.
+    """Integrate a unit of FMI 2.0 or 3.0 by DOP853; time, states and inputs are set before each derivative is read.
 
     Importers that set inputs between solver calls only hold them there, an error of first order in the output interval;
     here u(t) is set at every stage.
@@ -46,12 +46,7 @@ def replay_model_exchange(
     """
     with unpacked(path) as folder:
         description = read_model_description(folder, validate=False)
-        fmu = FMU2Model(
-            guid=description.guid,
-            modelIdentifier=description.modelExchange.modelIdentifier,
-            unzipDirectory=folder,
-            instanceName="instance",
-        )
+        fmu = new_unit(description, folder, "ModelExchange")
         fmu.instantiate(callbacks=collecting_callbacks([]))
         try:
             return _integrate(fmu, references(description.modelVariables), t, (z0, inputs), rtol)
@@ -60,7 +55,7 @@ def replay_model_exchange(
 
 
 def _integrate(
-    fmu: FMU2Model,
+    fmu: Any,
     vr: References,
     t: FloatArray,
     start: tuple[ComplexArray, Callable[[float], FloatArray]],

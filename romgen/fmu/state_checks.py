@@ -9,12 +9,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
+from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
 
 from romgen.arrays import FloatArray
 from romgen.fmu.check import random_input
-from romgen.fmu.driver import Slave, collecting_callbacks, opened_slave
+from romgen.fmu.driver import Slave, collecting_callbacks, new_unit, opened_slave
 from romgen.fmu.kernel_checks import START, final_state, interleaved
 from romgen.fmu.records import LevelRow
 from romgen.reduced_model import ReducedModel
@@ -113,10 +113,8 @@ def _memory(path: Path) -> Iterator[LevelRow]:
     if not sys.platform.startswith("linux"):
         return
     with opened_slave(path) as slave:
-        fmu = slave.fmu
-        library = FMU2Slave(
-            guid=fmu.guid, modelIdentifier=fmu.modelIdentifier, unzipDirectory=fmu.unzipDirectory, instanceName="one"
-        )
+        description = read_model_description(slave.fmu.unzipDirectory, validate=False)
+        library = new_unit(description, slave.fmu.unzipDirectory, "CoSimulation")
         callbacks = collecting_callbacks([])
         before = 0
         for k in range(CYCLES + 200):
@@ -164,9 +162,8 @@ def _misuse(path: Path, step: float) -> int:
             lambda: fmu.enterInitializationMode(),
         )
         taken = sum(not _refused(call) for call in bad)
-        again = FMU2Slave(
-            guid="{wrong}", modelIdentifier=fmu.modelIdentifier, unzipDirectory=fmu.unzipDirectory, instanceName="x"
-        )
+        description = read_model_description(fmu.unzipDirectory, validate=False)
+        again = new_unit(description, fmu.unzipDirectory, "CoSimulation", "{wrong}")
         return taken + (not _refused(lambda: again.instantiate(callbacks=collecting_callbacks([]))))
 
 

@@ -12,6 +12,7 @@ import pytest
 from romgen.errors import InputError
 from romgen.fmu.archive import write_archive
 from romgen.fmu.export import export_fmu
+from romgen.fmu.export3 import export_fmi3
 from romgen.fmu.levels import validate_unit
 from romgen.fmu.model_file import model_from_json, model_json
 from romgen.fmu.records import FmuExport, FmuInfo, LevelRow
@@ -28,6 +29,31 @@ def test_exported_units_pass_every_level(make, tmp_path: Path) -> None:
     host = {"newest GNU C library asked for, 2.04 for version 2.4"} if export.compiler != "zig" else set()
     assert [r.check for r in levels.rows if not r.passed and r.check not in host] == []
     assert {r.level for r in levels.rows} >= {"L0", "L1", "L2"}
+
+
+ALL = pytest.mark.slow
+KINDS = [
+    ("3.0", "file", "host"),
+    pytest.param("2.0", "file", "all", marks=ALL),
+    pytest.param("2.0", "embedded", "all", marks=ALL),
+    pytest.param("3.0", "file", "all", marks=ALL),
+    pytest.param("3.0", "embedded", "all", marks=ALL),
+]
+
+
+@pytest.mark.parametrize(("version", "coefficients", "platform"), KINDS)
+def test_units_pass_every_level_by_their_file_alone(
+    version: str, coefficients: str, platform: str, model: ReducedModel, tmp_path: Path
+) -> None:
+    """Both versions of FMI, both places of the coefficients, one platform and five; only the archive is at hand."""
+    write = export_fmu if version == "2.0" else export_fmi3
+    export = write(model, tmp_path / "x.fmu", FmuSettings(coefficients=coefficients, platforms=(platform,)))
+    levels = validate_unit(Path(export.path))
+    host = {"newest GNU C library asked for, 2.04 for version 2.4"} if export.compiler != "zig" else set()
+    assert [(r.check, r.value) for r in levels.rows if not r.passed and r.check not in host] == []
+    assert levels.problems == ()
+    counts = {level: sum(r.level == level for r in levels.rows) for level in ("L0", "L1", "L2", "L3")}
+    assert (counts["L0"] >= 3, counts["L1"], counts["L2"] >= 7, counts["L3"]) == (True, 9, True, 4)
 
 
 def test_absolute_outputs_do_not_disturb_the_levels(model: ReducedModel, tmp_path: Path) -> None:
