@@ -9,6 +9,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -178,14 +179,20 @@ def _run(compiler: Compiler, target: str | None, command: list[str], folder: Pat
 
 
 def cache_folder() -> Path:
-    """Where zig keeps the C libraries it has built, once per user."""
+    """Where zig keeps the C libraries it has built, once per user; a temporary folder where that is not writable."""
     if platform.system() == "Windows":
         base = Path(os.environ.get("LOCALAPPDATA", str(Path.home() / "AppData" / "Local")))
     elif platform.system() == "Darwin":
         base = Path.home() / "Library" / "Caches"
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")))
-    return base / "romgen" / "zig"
+    folder = base / "romgen" / "zig"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        writable = os.access(folder, os.W_OK)
+    except OSError:
+        writable = False
+    return folder if writable else Path(tempfile.gettempdir()) / "romgen" / "zig"
 
 
 def is_first_use(platform_name: str) -> bool:

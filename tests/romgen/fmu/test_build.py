@@ -159,6 +159,20 @@ def test_windows_libraries_carry_no_time_of_linking() -> None:
     assert cleaned[:0x80] == library[:0x80]
 
 
+def test_a_cache_folder_that_cannot_be_made_is_replaced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Homes of services and containers are often not writable."""
+    if host_platform() not in {"linux64", "aarch64-linux"}:
+        pytest.skip("the variable is that of Linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert compilers.cache_folder() == tmp_path / "romgen" / "zig"
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(compilers.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    assert compilers.cache_folder() == tmp_path / "temporary" / "romgen" / "zig"
+    compilers.remember_use("linux64")
+    assert not compilers.is_first_use("linux64")
+
+
 @pytest.mark.slow
 def test_all_platforms_from_one_machine(tmp_path: Path) -> None:
     """Five platforms, twice: the same bytes."""

@@ -41,7 +41,7 @@ def test_the_windows_library_computes_the_same_motion(run_cc: Callable[..., None
     run_cc("-std=c99", "-O1", "-Isources", SOURCE, "-o", "trajectory", "-ldl", "-lm", folder=folder)
     caches = {
         "ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "global"),
-        "ZIG_LOCAL_CACHE_DIR": str(cache_folder() / "local"),
+        "ZIG_LOCAL_CACHE_DIR": str(tmp_path / "zig"),
     }
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-Isources"]
     subprocess.run([*zig, str(SOURCE), "-o", "t.exe"], cwd=folder, env={**os.environ, **caches}, check=True)
