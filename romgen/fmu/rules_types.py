@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element
 
 DEFAULT_INITIAL = {
@@ -124,6 +124,6 @@ def limits(value: Element) -> tuple[float, float]:
     return float(value.get("min", "-inf")), float(value.get("max", "inf"))
 
 
-def repeated(names: list[str | None]) -> set[str]:
+def repeated(names: Sequence[str | None]) -> set[str]:
     """Names that occur more than once."""
     return {name for name in names if name is not None and names.count(name) > 1}
