@@ -19,6 +19,7 @@ from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo, FmuLevels
 from romgen.fmu.reference_files import write_reference_files
 from romgen.learning_stages import learned, learned_model
 from romgen.metrics import nmte_percent
+from romgen.progress import Report
 from romgen.settings import Study
 from romgen.stage import Context, Stage
 from romgen.trajectory_error import TrajectoryError
@@ -88,14 +89,27 @@ def export(context: Context) -> Exported:
         input_range=_input_range(study, model.inputs),
         picture=None if study.fmu.icon is None else study.fmu.icon.read_bytes(),
     )
-    native = export_fmu(model, _path(context, ""), study.fmu, info=info, report=context.report)
+    share = 0.5 if study.fmu.fmi3 else 1.0
+    native = export_fmu(model, _path(context, ""), study.fmu, info=info, report=_part(context.report, 0.0, share))
     for note in native.notes:
         log.warning("%s", note)
     python = (
         export_pythonfmu(model, _path(context, "_pythonfmu"), study.fmu, info=info) if study.fmu.pythonfmu else None
     )
-    array_unit = export_fmi3(model, _path(context, "_fmi3"), study.fmu, info=info) if study.fmu.fmi3 else None
+    array_unit = None
+    if study.fmu.fmi3:
+        report = _part(context.report, share, 1.0)
+        array_unit = export_fmi3(model, _path(context, "_fmi3"), study.fmu, info=info, report=report)
     return Exported(native, python, array_unit)
+
+
+def _part(report: Report, start: float, end: float) -> Report:
+    """Report the progress of one part of the work as that of the whole."""
+
+    def told(fraction: float, text: str) -> None:
+        report(start + (end - start) * fraction, text)
+
+    return told
 
 
 def _base_share(study: Study) -> tuple[float, ...]:

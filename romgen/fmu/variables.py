@@ -84,7 +84,7 @@ def _inputs(model: ReducedModel, input_range: tuple[tuple[float, float], ...]) -
         Variable(
             name,
             0,
-            f"load input {given}, linear in each step through fmi2SetRealInputDerivatives, held otherwise",
+            f"load input {given}, held within a step unless the importer gives its course there",
             "input",
             "continuous",
             None,

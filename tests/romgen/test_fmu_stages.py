@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from romgen.fmu_stages import _input_range
+from romgen.fmu_stages import _input_range, _part
 from romgen.settings import Study
 from romgen.stage import table_content
 
@@ -43,3 +43,12 @@ def test_an_empty_range_is_no_range() -> None:
     assert _input_range(study(forced_response={"levels": [0.0]}), ("base_acceleration",)) == ()
     with pytest.raises(ValueError, match="unknown unit"):
         study(fmu={"input_range": {"base_acceleration": ["-1 kg", 1.0]}})
+
+
+def test_progress_of_two_exports_is_one_bar() -> None:
+    seen: list[float] = []
+    for start, end in ((0.0, 0.5), (0.5, 1.0)):
+        told = _part(lambda fraction, text: seen.append(fraction), start, end)
+        told(0.0, "")
+        told(1.0, "")
+    assert seen == [0.0, 0.5, 0.5, 1.0]

@@ -77,6 +77,12 @@ def test_fmpy_and_the_schemas_find_no_problem(unit3: FmuExport, unpacked3: Path)
         etree.XMLSchema(file=str(schemas / schema)).assertValid(etree.parse(str(unpacked3 / file)))
 
 
+def test_the_description_speaks_of_its_own_version(unpacked3: Path) -> None:
+    text = (unpacked3 / "modelDescription.xml").read_text(encoding="utf-8")
+    assert "intermediateUpdate" in text
+    assert "fmi2" not in text
+
+
 @pytest.mark.parametrize("options", [InterfaceOptions(), InterfaceOptions((), (1.0, 0.5, 0.0), True)])
 def test_strict_c99_and_exactly_the_functions_of_the_standard(
     options: InterfaceOptions, model: ReducedModel, run_cc: Callable[..., None], tmp_path: Path
