@@ -11,23 +11,32 @@ from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.contact_report import PenaltyReport, penalty_reports
 from fem.equilibrium import InterfaceState, interface_states
 from fem.errors import FemConvergenceError, FemError, FemInputError
-from fem.excitation import TimeLoad, base_load, time_load
+from fem.excitation import SupportMotion, TimeLoad, base_load, support_motion, time_load
+from fem.history import History, record_history
 from fem.inp_writer import nodal_loads, write_inp
 from fem.interfaces import Pair, Tie
 from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
 from fem.material import Material
 from fem.merge import merged
 from fem.mesh import Mesh, within
-from fem.modal_quantities import effective_masses, mac, near_integer_ratios, participation_factors, total_masses
+from fem.modal_quantities import (
+    effective_masses,
+    frequency_response,
+    mac,
+    near_integer_ratios,
+    participation_factors,
+    total_masses,
+)
 from fem.model import Body, Model, build_model
 from fem.modes import ModalBasis, Rayleigh, no_modes, rayleigh, rest_state, solve_modes
 from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
-from fem.reaction import reaction
+from fem.reaction import reaction, reaction_moment
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
 from fem.sliding import SlidingWarning
-from fem.stress import integration_point_stress, nodal_stress
+from fem.springs import Foundation, PointMass, Spring
+from fem.stress import integration_point_stress, nodal_stress, point_stress
 from fem.supports import Support
 from fem.tightening import bolt_force
 from fem.transient import Transient, TransientSettings
@@ -43,7 +52,9 @@ __all__ = [
     "FemError",
     "FemInputError",
     "Force",
+    "Foundation",
     "Gravity",
+    "History",
     "InterfaceState",
     "Material",
     "Mesh",
@@ -55,15 +66,18 @@ __all__ = [
     "PathSettings",
     "PenaltyReport",
     "PointForce",
+    "PointMass",
     "Pressure",
     "Rayleigh",
     "Sensor",
     "SlidingWarning",
+    "Spring",
     "Starts",
     "StaticSettings",
     "StaticState",
     "StepRecord",
     "Support",
+    "SupportMotion",
     "Tie",
     "TimeLoad",
     "Traction",
@@ -74,6 +88,7 @@ __all__ = [
     "build_model",
     "effective_masses",
     "follow_path",
+    "frequency_response",
     "graded",
     "hex_block",
     "integration_point_stress",
@@ -90,15 +105,19 @@ __all__ = [
     "nodal_stress",
     "participation_factors",
     "penalty_reports",
+    "point_stress",
     "rayleigh",
     "reaction",
+    "reaction_moment",
     "read_mesh",
+    "record_history",
     "rest_state",
     "sensor_rows",
     "snap_back_starts",
     "solve_modes",
     "solve_preload",
     "solve_static",
+    "support_motion",
     "time_load",
     "total_masses",
     "within",

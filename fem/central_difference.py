@@ -101,7 +101,7 @@ class ExplicitTransient:
 
         All modes are resolved, ``settled`` or not.
         """
-        return self.dynamics.start(displacement, velocity, slip, self.settings.solver)
+        return self.dynamics.start(displacement, velocity, slip, self.settings.solver, self.settings.time_step)
 
     def observe(self, state: MotionState) -> StepRecord:
         """The record of a state that no step led to (t = 0)."""

@@ -30,14 +30,22 @@ ADVICE = "use a smaller time step, a smaller amplitude, or a start that has sett
 
 
 class Corrector:
-    """Solves steps to a residual of ``tolerance`` times ``scale`` N in at most ``max_iterations``."""
+    """Solves steps to a residual of ``tolerance`` times ``scale`` N in at most ``max_iterations``.
 
-    def __init__(self, tolerance: float, scale: float, max_iterations: int) -> None:
+    Without a scale it is the largest inertia force or load of the case so far, this step included.
+    """
+
+    def __init__(self, tolerance: float, scale: float | None, max_iterations: int) -> None:
         self.tolerance, self.scale, self.max_iterations = tolerance, scale, max_iterations
 
-    def size(self, residual: FloatArray) -> FloatArray:
-        """Residuals (n_dof, n_case) relative to the scale, (n_case,)."""
-        return np.asarray(np.sqrt(np.einsum("nc,nc->c", residual, residual)) / self.scale)
+    def size(self, trial: Trial, problem: StepProblem) -> FloatArray:
+        """Norms of the residuals relative to the scale, (n_case,)."""
+        residual = np.sqrt(np.einsum("nc,nc->c", trial.residual, trial.residual))
+        if self.scale is not None:
+            return np.asarray(residual / self.scale)
+        scale = np.maximum(problem.force, np.sqrt(np.einsum("nc,nc->c", trial.inertia_a, trial.inertia_a)))
+        # A case at rest on which nothing acts has neither residual nor scale.
+        return np.asarray(residual / np.where(scale > 0.0, scale, 1.0))
 
     def failure(self, problem: StepProblem, history: list[float]) -> FemConvergenceError:
         """The error of a step that was given up after these residuals."""
@@ -67,7 +75,7 @@ class Corrector:
         found: list[tuple[IntArray, SolvedStep]] = []
         for iteration in range(self.max_iterations):
             trial = equation.evaluate(a, problem)
-            size = self.size(trial.residual)
+            size = self.size(trial, problem)
             history.append(float(size.max()))
             active = ~(size <= self.tolerance)
             if not active.all():
@@ -103,7 +111,7 @@ class Corrector:
         history: list[float] = []
         for iteration in range(self.max_iterations):
             trial = equation.evaluate(a, problem)
-            history.append(float(self.size(trial.residual)[0]))
+            history.append(float(self.size(trial, problem)[0]))
             if history[-1] <= self.tolerance:
                 return _solved(a, trial, np.array([iteration]))
             if not history[-1] < DIVERGED:

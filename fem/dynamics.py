@@ -8,7 +8,7 @@ import numpy as np
 
 from fem.arrays import FloatArray
 from fem.contact import ContactState
-from fem.excitation import TimeLoad
+from fem.excitation import SupportMotion, TimeLoad
 from fem.linear_operators import LinearOperators
 from fem.linear_solver import make_solver
 from fem.model import Model
@@ -26,9 +26,14 @@ class Dynamics:
     """
 
     def __init__(
-        self, model: Model, equilibrium: StaticState, damping: Rayleigh, loads: Sequence[TimeLoad] = ()
+        self,
+        model: Model,
+        equilibrium: StaticState,
+        damping: Rayleigh,
+        loads: Sequence[TimeLoad] = (),
+        motions: Sequence[SupportMotion] = (),
     ) -> None:
-        self.model, self.equilibrium, self.loads = model, equilibrium, tuple(loads)
+        self.model, self.equilibrium, self.loads, self.motions = model, equilibrium, tuple(loads), tuple(motions)
         self.alpha, self.beta = damping.alpha, damping.beta
         self.mask = model.free[:, None].astype(float)
         self.damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
@@ -73,32 +78,79 @@ class Dynamics:
             load = load + np.outer(part.pattern, part.at(t, n_case))
         return load
 
+    def held(self, u: FloatArray, t: float) -> FloatArray:
+        """u (n_dof, n_case) with the supports where their motions have them at t."""
+        if not self.motions:
+            return u
+        given = np.repeat(self.equilibrium.u[:, None], u.shape[1], axis=1)
+        for motion in self.motions:
+            given += np.outer(motion.pattern, motion.at(t, u.shape[1]))
+        return np.where(self.mask > 0.0, u, given)
+
+    def support_work(
+        self, old: MotionState, new: MotionState, weights: tuple[float, float], load: FloatArray
+    ) -> FloatArray:
+        """Work (n_case,) J that moving supports do in a step, by the reactions M a + C v + f - p of the scheme.
+
+        weights : alpha_m and alpha_f of the scheme; load (n_dof, n_case) N at alpha_f.
+        """
+        if not self.motions:
+            return np.zeros(new.u.shape[1])
+        am, af = weights
+        inertia = (1.0 - am) * new.inertia_a + am * old.inertia_a
+        new_force, old_force = (s.damping_v + s.force + s.viscous for s in (new, old))
+        reaction = inertia + (1.0 - af) * new_force + af * old_force - load
+        return np.asarray(np.einsum("nc,nc->c", (1.0 - self.mask) * reaction, new.u - old.u))
+
     def start(
-        self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None, solver: str
+        self,
+        displacement: FloatArray,
+        velocity: FloatArray,
+        slip: FloatArray | None,
+        solver: str,
+        step: float,
     ) -> MotionState:
-        """State at t = 0 for displacement from the equilibrium and velocity: M a = p - f - C v."""
+        """State at t = 0 for displacement from the equilibrium and velocity: M a = p - f - C v.
+
+        step : s, over which the rates of moving supports are taken.
+        """
         n_case = displacement.shape[1]
+        moved_v, moved_a = self._support_rates(step, n_case)
         u = self.equilibrium.u[:, None] + displacement * self.mask
-        v = velocity * self.mask
+        v = velocity * self.mask + moved_v
         if slip is None:
             slip = np.repeat(self.equilibrium.contact.slip, n_case, axis=2)
         contact = self.contact(u, slip)
         force, viscous, _ = self.forces(u, v, contact)
-        net = (self.load(0.0, n_case) - force - viscous - self.damping(v)) * self.mask
+        net = (self.load(0.0, n_case) - force - viscous - self.damping(v) - self.mass(moved_a)) * self.mask
         direct = make_solver(solver, symmetric=True)
         mass = self.model.constrain(self.model.mass)
         direct.analyse(mass)
         direct.factor(mass)
-        return self.at_rest(u, v, direct.solve(net), (force, viscous), contact)
+        return self.at_rest(u, v, direct.solve(net) + moved_a, (force, viscous), contact)
+
+    def _support_rates(self, step: float, n_case: int) -> tuple[FloatArray, FloatArray]:
+        """Velocity and acceleration (n_dof, n_case) of the supports at t = 0."""
+        v = np.zeros((self.model.n_dof, n_case))
+        a = np.zeros_like(v)
+        for motion in self.motions:
+            first, second = motion.rates(step, n_case)
+            v += np.outer(motion.pattern, first)
+            a += np.outer(motion.pattern, second)
+        return v, a
 
     def at_rest(
         self, u: FloatArray, v: FloatArray, a: FloatArray, forces: tuple[FloatArray, FloatArray], contact: ContactState
     ) -> MotionState:
         """The state from which a march starts at t = 0."""
         products = (*self.mass_and_damping(a), *self.mass_and_damping(v))
-        pace = Pace.beginning(u, contact.slip, self.size(u))
+        pace = Pace.beginning(u, contact.slip, self.size(u), self.norm(products[0]))
         work = np.zeros((3, u.shape[1]))
         return MotionState(0, u, v, a, *forces, *products, contact.slip, u[None].copy(), work, pace)
+
+    def norm(self, force: FloatArray) -> FloatArray:
+        """Norm of a force (n_dof, n_case) over what no support holds, (n_case,) N."""
+        return np.asarray(np.linalg.norm(force * self.mask, axis=0))
 
     def size(self, u: FloatArray) -> FloatArray:
         """Mass norm of the displacement from the equilibrium, (n_case,) m kg^0.5."""

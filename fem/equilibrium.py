@@ -20,7 +20,7 @@ class InterfaceState:
     (n,) 0 open, 1 stick, 2 slip; slip (n, 2) m, where the springs of stick are anchored; dissipated (n,) work of
     friction per area in J/m^2, nan where it was not kept. ``normal_force`` is the resultant of the pressure, ``force``
     (3,) that of all tractions on the master, ``applied_force`` what the loads send through the pair, nan where supports
-    on both sides or a bolt leave that open; ``contact_area`` is the area of the closed points.
+    on both sides, springs or a bolt leave that open; ``contact_area`` is the area of the closed points.
     """
 
     name: str
@@ -119,7 +119,8 @@ def _group(model: Model, body: str, without: int) -> set[str]:
 def _held(model: Model, body: str, normal: FloatArray) -> bool:
     start, stop = _dofs(model, body)
     directions = (~model.free[start:stop].reshape(-1, 3)).any(axis=0)
-    return bool(np.any(np.abs(normal[directions]) > 1e-3))
+    sprung = model.springs.operator[:, start:stop].nnz > 0
+    return sprung or bool(np.any(np.abs(normal[directions]) > 1e-3))
 
 
 def _load(model: Model, body: str) -> FloatArray:

@@ -41,3 +41,4 @@ class FemConvergenceError(FemError):
         super().__init__(what, where=where, value=value, advice=advice)
         self.history = history
         self.last_good: object = None
+        self.last_contact: object = None

@@ -29,7 +29,8 @@ def write_inp(path: Path, model: Model) -> None:
 
     Raises
     ------
-    FemInputError : HEX27 cells, which CalculiX does not have, an initial stress, bolts, supports that move.
+    FemInputError : HEX27 cells, which CalculiX does not have, an initial stress, bolts, springs, point masses,
+        supports that move.
     """
     _check(path, model)
     path.write_text("\n".join([*_mesh(model), *_materials(model), *_supports(model), *_joints(model), ""]))
@@ -52,6 +53,9 @@ def _check(path: Path, model: Model) -> None:
             raise FemInputError("an initial stress is not written", where=where)
     if model.bolts.bolts:
         raise FemInputError("bolts are not written", where=path.name, value=len(model.bolts.bolts))
+    if model.springs.names or model.point_masses:
+        names = (*model.springs.names, *(mass.name for mass in model.point_masses))
+        raise FemInputError("springs and point masses are not written", where=path.name, value=", ".join(names))
     if np.any(model.prescribed):
         raise FemInputError("only supports at rest are written", where=path.name)
 

@@ -7,7 +7,7 @@ import logging
 import time
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -94,28 +94,52 @@ class SuperLU:
         return SolverStatistics(self.name, entries, 12 * entries, self._solves, **self._seconds)
 
 
+SYMMETRIC_ONLY = ("cholmod",)
+"""Solvers of symmetric positive definite matrices; the next one takes the others."""
+
+
 @cache
 def available_solvers() -> tuple[str, ...]:
     """Names of the solvers that can be used here, fastest first."""
+    found = ["pardiso"] if _has_pardiso() else []
+    found += [name for name, package in (("cholmod", "sksparse"), ("mumps", "mumps")) if _imports(name, package)]
+    return (*found, "superlu")
+
+
+def _has_pardiso() -> bool:
     if not importlib.util.find_spec("pypardiso"):
-        return ("superlu",)
+        return False
     try:
         importlib.import_module("fem.pardiso").load_mkl()
     except (ImportError, OSError) as error:
-        log.warning("pypardiso is installed but its MKL does not load (%s): the slower SuperLU takes over", error)
-        return ("superlu",)
-    return ("pardiso", "superlu")
+        log.warning("pypardiso is installed but its MKL does not load (%s): a slower solver takes over", error)
+        return False
+    return True
+
+
+def _imports(name: str, package: str) -> bool:
+    """Whether an adapter finds its package, in a version that it knows."""
+    if not importlib.util.find_spec(package):
+        return False
+    try:
+        importlib.import_module(f"fem.{name}")
+    except (ImportError, OSError) as error:
+        log.warning("%s is installed but does not serve as a solver (%s)", package, error)
+        return False
+    return True
 
 
 def make_solver(name: str = "auto", *, symmetric: bool, single: bool = False) -> LinearSolver:
-    """A solver by name; "auto" takes the fastest importable one.
+    """A solver by name; "auto" takes the fastest importable one that solves this kind of matrix.
 
     Parameters
     ----------
-    symmetric : the matrix is symmetric positive definite.
-    single : single precision is good enough (preconditioner); ignored by solvers without it.
+    symmetric : the matrix is symmetric positive definite; where it is not, "cholmod" hands it to the next solver.
+    single : single precision is good enough (preconditioner); ignored by solvers without it (all but pardiso).
     """
     chosen = available_solvers()[0] if name == "auto" else name
+    if chosen in SYMMETRIC_ONLY and not symmetric:
+        chosen = next(other for other in available_solvers() if other not in SYMMETRIC_ONLY)
     if chosen not in available_solvers():
         advice = f"choose one of {', '.join(available_solvers())} or install the extra 'fem'"
         raise FemInputError("unknown or missing linear solver", where="linear solver", value=name, advice=advice)
@@ -124,4 +148,8 @@ def make_solver(name: str = "auto", *, symmetric: bool, single: bool = False) ->
         pardiso = importlib.import_module("fem.pardiso")
         solver: LinearSolver = pardiso.Pardiso(symmetric=symmetric, single=single)
         return solver
+    if chosen == "cholmod":
+        return cast(LinearSolver, importlib.import_module("fem.cholmod").Cholmod())
+    if chosen == "mumps":
+        return cast(LinearSolver, importlib.import_module("fem.mumps").Mumps(symmetric=symmetric))
     return SuperLU(symmetric=symmetric, single=single)

@@ -7,9 +7,9 @@ from math import gcd
 
 import numpy as np
 
-from fem.arrays import FloatArray
+from fem.arrays import ComplexArray, FloatArray
 from fem.model import Model
-from fem.modes import ModalBasis
+from fem.modes import ModalBasis, Rayleigh, damping_ratios
 
 
 @dataclass(frozen=True)
@@ -80,3 +80,21 @@ def _rigid(model: Model) -> FloatArray:
     motion[:, :, :3] = np.eye(3)
     motion[:, :, 3:] = np.cross(np.eye(3)[None], (model.points - centre)[:, None, :]).transpose(0, 2, 1)
     return motion.reshape(model.n_dof, 6)
+
+
+def frequency_response(
+    modes: ModalBasis, damping: Rayleigh, load: FloatArray, sensors: FloatArray, frequency_hz: FloatArray
+) -> ComplexArray:
+    """H(Omega) = sum_j (S phi_j)(phi_j' p) / (omega_j^2 - Omega^2 + 2 i zeta_j omega_j Omega), (n_frequency, n_sensor).
+
+    The linear answer in m to a load p cos(Omega t), closed points stuck, by the given modes only: what the higher ones
+    would add is their static answer, about (Omega / omega)^2 of which is left out.
+
+    Parameters
+    ----------
+    load : (n_dof,) N, such as ``TimeLoad.pattern``; sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
+    """
+    Omega = 2.0 * np.pi * np.asarray(frequency_hz, dtype=float)[:, None]
+    zeta = damping_ratios(modes, damping)
+    modal = (modes.shapes.T @ load) / (modes.omega**2 - Omega**2 + 2.0j * zeta * modes.omega * Omega)
+    return np.asarray(modal @ (sensors @ modes.shapes).T)

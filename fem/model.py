@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,6 +17,16 @@ from fem.errors import FemInputError
 from fem.interfaces import Pair, Tie, bond_stiffness, default_penalty, pair_contact, tie_bond
 from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Pressure, Traction, load_vector
 from fem.sparse_product import SparseProduct
+from fem.springs import (
+    Elastic,
+    Foundation,
+    PointMass,
+    Spring,
+    SpringSet,
+    lumped_point_masses,
+    point_mass_matrix,
+    spring_set,
+)
 from fem.supports import AXES, Support, held
 
 __all__ = [
@@ -25,11 +35,14 @@ __all__ = [
     "Bolt",
     "Clamp",
     "Force",
+    "Foundation",
     "Gravity",
     "Model",
     "Pair",
     "PointForce",
+    "PointMass",
     "Pressure",
+    "Spring",
     "Support",
     "Tie",
     "Traction",
@@ -52,6 +65,7 @@ class Model:
     free : (n_dof,) False where a support holds; prescribed : (n_dof,) m, displacement there at load factor 1.
     load : (n_dof,) N, sum of clamps and other loads at load factor 1; loads : (n_load, n_dof) each one, clamps first.
     ties, bonds : bonded surfaces, then the sections of bolts, and their points; bolts : see ``BoltSet``.
+    springs : springs and foundations, part of ``stiffness``; point_masses : part of ``mass``.
     """
 
     bodies: tuple[Body, ...]
@@ -71,6 +85,8 @@ class Model:
     ties: tuple[Tie, ...]
     bonds: Contact
     bolts: BoltSet
+    springs: SpringSet
+    point_masses: tuple[PointMass, ...]
 
     @property
     def n_dof(self) -> int:
@@ -124,7 +140,7 @@ class Model:
 
     def lumped_mass(self) -> FloatArray:
         """Diagonal mass (n_dof,) in kg by the scheme of Hinton, Rock and Zienkiewicz, see ``lumped_masses``."""
-        mass = np.zeros(len(self.points))
+        mass = lumped_point_masses(self.point_masses, Assembly(self.bodies, self.offsets, self.points, self.mass))
         for body, offset in zip(self.bodies, self.offsets, strict=True):
             np.add.at(mass, body.mesh.cells + offset, lumped_masses(body.mesh, body.material.density))
         return np.repeat(mass, 3)
@@ -145,8 +161,10 @@ def build_model(
     loads: Sequence[Load] = (),
     ties: Sequence[Tie] = (),
     bolts: Sequence[Bolt] = (),
+    springs: Sequence[Elastic] = (),
+    point_masses: Sequence[PointMass] = (),
 ) -> Model:
-    """Assemble bodies, interfaces, ties, bolts, supports, clamping pressures and other dead loads into a model.
+    """Assemble bodies, interfaces, ties, bolts, supports, springs, masses and dead loads into a model.
 
     Unknown names, inverted cells, interfaces without partners and numbers that are not finite raise ``FemInputError``.
     """
@@ -155,27 +173,23 @@ def build_model(
     offsets = np.concatenate([[0], np.cumsum([len(body.mesh.points) for body in bodies])[:-1]]).astype(np.int64)
     points = np.vstack([body.mesh.points for body in bodies])
     n_node = len(points)
-    nonlinear, stiffness, mass = [], sp.csr_matrix((3 * n_node, 3 * n_node)), sp.csr_matrix((3 * n_node, 3 * n_node))
-    for body, offset in zip(bodies, offsets, strict=True):
-        cells = make_cells(body, int(offset), n_node)
-        mass = mass + cells.assemble(mass_blocks(body.mesh, body.material.density))
-        if body.kinematics == "linear":
-            stiffness = stiffness + cells.assemble(cells.element_tangents(np.zeros(3 * n_node)))
-        else:
-            nonlinear.append(cells)
+    nonlinear, stiffness, mass = _matrices(bodies, offsets, n_node)
     contact = join(tuple(pair_contact(bodies, offsets, points, pair) for pair in pairs), 3 * n_node)
     all_ties = (*ties, *sections)
     bonds = tuple(tie_bond(bodies, offsets, points, tie) for tie in all_ties)
     stiffness = sum((bond_stiffness(bond) for bond in bonds), stiffness)
     assembly = Assembly(bodies, offsets, points, mass)
+    elastic = spring_set(springs, assembly)
+    mass = mass + point_mass_matrix(point_masses, assembly)
+    assembly = replace(assembly, mass=mass)
     vectors = np.array([load_vector(load, assembly) for load in (*clamps, *loads)]).reshape(-1, 3 * n_node)
     free, prescribed = held(bodies, offsets, n_node, supports)
     return Model(
         bodies,
         offsets,
         points,
-        tuple(nonlinear),
-        stiffness.tocsr(),
+        nonlinear,
+        (stiffness + elastic.matrix).tocsr(),
         mass.tocsr(),
         contact,
         tuple(pairs),
@@ -188,7 +202,24 @@ def build_model(
         all_ties,
         join(bonds, 3 * n_node),
         bolt_set(bolts, bonds[len(bonds) - len(sections) :], 3 * n_node),
+        elastic,
+        tuple(point_masses),
     )
+
+
+def _matrices(
+    bodies: Sequence[Body], offsets: IntArray, n_node: int
+) -> tuple[tuple[Cells, ...], sp.csr_matrix, sp.csr_matrix]:
+    """Cells of the Green-Lagrange bodies, stiffness of the linear ones, mass of all."""
+    nonlinear, stiffness, mass = [], sp.csr_matrix((3 * n_node, 3 * n_node)), sp.csr_matrix((3 * n_node, 3 * n_node))
+    for body, offset in zip(bodies, offsets, strict=True):
+        cells = make_cells(body, int(offset), n_node)
+        mass = mass + cells.assemble(mass_blocks(body.mesh, body.material.density))
+        if body.kinematics == "linear":
+            stiffness = stiffness + cells.assemble(cells.element_tangents(np.zeros(3 * n_node)))
+        else:
+            nonlinear.append(cells)
+    return tuple(nonlinear), stiffness, mass
 
 
 def _check_names(bodies: Sequence[Body]) -> None:

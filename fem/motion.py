@@ -21,6 +21,7 @@ class Pace:
     level : halvings of the output interval that the next step tries first; last_level : those of the last step.
     jerk : (n_dof, n_case) m/s^3, backward difference of the accelerations of the last step.
     peak : (n_case,) largest mass norm of the displacement from the equilibrium so far, m kg^0.5.
+    force : (n_case,) N, largest norm of the inertia force so far.
     waited, patience : (n_case,) steps since a case got a factor of its own, and steps to wait for the next one.
     before : (n_case,) iterations of the step for which it got it.
     anchored : (n_anchor,) cases with a factor of their own; anchor_u (n_dof, n_anchor) m and anchor_slip (n_point, 2,
@@ -32,6 +33,7 @@ class Pace:
     last_level: int
     jerk: FloatArray
     peak: FloatArray
+    force: FloatArray
     waited: IntArray
     patience: IntArray
     before: IntArray
@@ -40,12 +42,12 @@ class Pace:
     anchor_slip: FloatArray
 
     @staticmethod
-    def beginning(u: FloatArray, slip: FloatArray, peak: FloatArray) -> Pace:
+    def beginning(u: FloatArray, slip: FloatArray, peak: FloatArray, force: FloatArray) -> Pace:
         """At t = 0: whole output intervals, the factor of the equilibrium."""
         zero = np.zeros(u.shape[1], dtype=np.int64)
         none = zero[:0]
         still = np.zeros_like(u)
-        return Pace(0.0, 0, 0, still, peak, zero, zero, zero, none, u[:, :0].copy(), slip[:, :, :0].copy())
+        return Pace(0.0, 0, 0, still, peak, force, zero, zero, zero, none, u[:, :0].copy(), slip[:, :, :0].copy())
 
 
 @dataclass(frozen=True)

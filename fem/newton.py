@@ -92,6 +92,7 @@ class LoadStep:
     def __init__(self, model: Model, target: Target, slip: FloatArray, tolerance: Tolerance) -> None:
         self.model, self.target, self._slip, self._tolerance = model, target, slip, tolerance
         self._closing = 0
+        self._last: ContactState | None = None
         self._large = TangentSolver(np.empty((model.n_dof, 0)), tolerance.solver)
 
     def solve(self, u: FloatArray, shortening: FloatArray) -> Point:
@@ -103,12 +104,14 @@ class LoadStep:
         if found is not None:
             return found
         limit = self._tolerance
-        raise FemConvergenceError(
+        error = FemConvergenceError(
             "no static equilibrium",
             where="preload",
             value=f"relative residual {limit.history[-1]:.2e} after {limit.max_iterations} iterations",
             history=tuple(limit.history),
         )
+        error.last_contact = self._last
+        raise error
 
     def _newton(self, u: FloatArray, shortening: FloatArray, lengths: tuple[float, ...]) -> Point | None:
         limit = self._tolerance
@@ -126,6 +129,7 @@ class LoadStep:
             # Moving supports and closing surfaces pass through states out of balance: no judging by the residual.
             tried = (1.0,) if driving or closing else lengths
             point = self._iterate(point, tried, driving=driving, closing=closing)
+            self._last = point.contact
         return None
 
     def _at(self, u: FloatArray, shortening: FloatArray) -> Point:

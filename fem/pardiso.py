@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import importlib
+import importlib.metadata
 import os
 import time
 import weakref
@@ -93,14 +94,27 @@ class Pardiso:
 
 @cache
 def load_mkl() -> Callable[..., None]:
-    """MKL's pardiso; ``ImportError`` where it is missing.
-
-    Finding the library searches the whole environment, so once per process.
-    """
+    """MKL's pardiso; ``ImportError`` where it is missing."""
+    library = _mkl_library()
+    if library is not None:
+        os.environ.setdefault("PYPARDISO_MKL_RT", library)
     # Loads MKL, so not before the environment above is set.
-    solver = importlib.import_module("pypardiso").PyPardisoSolver()
+    solver = importlib.import_module("pypardiso").ps
     function: Callable[..., None] = solver._mkl_pardiso
     return function
+
+
+def _mkl_library() -> str | None:
+    """Path of mkl_rt in the installed package mkl; None leaves the search to pypardiso.
+
+    That one lists all files of the environment: half a second at every start.
+    """
+    try:
+        files = importlib.metadata.files("mkl") or []
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    found = [str(file.locate()) for file in files if "mkl_rt" in file.name]
+    return next((path for path in found if os.path.isfile(path)), None)
 
 
 class _Handle:

@@ -12,7 +12,7 @@ from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.model import Model
 from fem.newton import LoadStep, Target, Tolerance, internal_force
-from fem.rigid_motion import check_restraint
+from fem.rigid_motion import check_restraint, loose_bodies, loose_motion
 from fem.sliding import warn_of_sliding
 
 Progress = Callable[[float], None]
@@ -177,6 +177,16 @@ class _Loading:
         history = tuple(self._tolerance.history)
         return StaticState(self._u, self._contact, tuple(self._factors), history, self._dissipated.copy())
 
+    def _advice(self, contact: object) -> str:
+        """What the last iterate says about the failure: a part that all its closed points let slide, or nothing."""
+        if isinstance(contact, ContactState):
+            status = contact.status[:, 0]
+            share = loose_motion(self._model, status > 0, status == 2)
+            if share is not None and (status == 2).any():
+                slides = loose_bodies(self._model, share)
+                return f"friction does not hold {slides} under this load; use less load, more friction or a support"
+        return "use more load steps, or check supports and gaps of the loose part"
+
     def _failure(self, error: FemConvergenceError, factor: float) -> FemConvergenceError:
         names, pair = self._model.contact.names, self._model.contact.pair
         counts = [np.bincount(self._contact.status[pair == n, 0], minlength=3) for n in range(len(names))]
@@ -186,8 +196,8 @@ class _Loading:
         failure = FemConvergenceError(
             error.what,
             where=error.where,
-            value=f"load factor {factor:.4g} reached, then {error.args[0]}; contact there: {status or 'none'}",
-            advice="use more load steps, or check supports and gaps of the loose part",
+            value=f"load factor {factor:.4g} reached, then {error.value}; contact there: {status or 'none'}",
+            advice=self._advice(error.last_contact),
             history=tuple(self._tolerance.history),
         )
         failure.last_good = self._state()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from fem.arrays import FloatArray
+from fem.arrays import FloatArray, IntArray
 from fem.body import locate
 from fem.model import Model
 from fem.newton import internal_force
@@ -16,8 +18,25 @@ def reaction(model: Model, state: StaticState, region: str, *, load_factor: floa
 
     R = sum of f_int + f_contact - lambda p over the held components; free components are in balance and count nothing.
     """
+    return np.asarray(_nodal(model, state, region, load_factor)[1].sum(axis=0))
+
+
+def reaction_moment(
+    model: Model, state: StaticState, region: str, about: Sequence[float], *, load_factor: float = 1.0
+) -> FloatArray:
+    """Moment (3,) in N m of the same forces about a point (m) in space, at the displaced nodes.
+
+    M = sum of (x + u - about) x R.
+    """
+    nodes, forces = _nodal(model, state, region, load_factor)
+    arms = model.points[nodes] + state.u.reshape(-1, 3)[nodes] - np.asarray(about, dtype=float)
+    return np.asarray(np.cross(arms, forces).sum(axis=0))
+
+
+def _nodal(model: Model, state: StaticState, region: str, load_factor: float) -> tuple[IntArray, FloatArray]:
+    """Nodes (n,) of a region and the forces (n, 3) in N of the supports on them."""
     index, name = locate(model.bodies, region)
     nodes = model.bodies[index].mesh.nodes(name) + model.offsets[index]
     force, _ = internal_force(model, state.u, state.contact.slip)
     carried = np.where(model.free, 0.0, force - load_factor * model.load)
-    return np.asarray(carried.reshape(-1, 3)[nodes].sum(axis=0))
+    return nodes, np.asarray(carried.reshape(-1, 3)[nodes])

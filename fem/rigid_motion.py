@@ -32,22 +32,26 @@ def check_restraint(model: Model) -> None:
     share = loose_motion(model, np.ones(model.contact.n_point, dtype=bool))
     if share is None:
         return
-    advice = "add a support, a tie or a contact that holds it"
+    advice = "add a support, a spring, a tie or a contact that holds it"
     raise FemInputError(
         "nothing holds a part of the structure", where=loose_bodies(model, share), value=_words(share), advice=advice
     )
 
 
-def loose_motion(model: Model, closed: BoolArray) -> FloatArray | None:
-    """A rigid motion (n_body, 6) that supports, ties and the ``closed`` contact points (n_point,) let pass, or None.
+def loose_motion(model: Model, closed: BoolArray, sliding: BoolArray | None = None) -> FloatArray | None:
+    """A rigid motion (n_body, 6) that supports, springs, ties and the ``closed`` points (n_point,) let pass, or None.
 
-    Rank of the supported rows and of B R over the rigid motions R; frictionless points resist along the normal only.
+    Rank of the supported rows and of B R over the rigid motions R; points that have no friction, or are
+    ``sliding`` (n_point,), resist along the normal only.
     """
     motions = rigid_motions(model)
     contact, bonds = model.contact, model.bonds
     rough = closed & (contact.law[:, 2] > 0.0)
+    if sliding is not None:
+        rough &= ~sliding
     resists = np.column_stack([closed, rough, rough]).ravel()
     parts = [motions[~model.free], (contact.operator @ motions)[resists], bonds.operator @ motions]
+    parts.append(model.springs.operator @ motions)
     # At least as many rows as columns, so that every direction of the null space has its singular value.
     restraint = np.vstack([*parts, np.zeros((motions.shape[1], motions.shape[1]))])
     _, size, directions = np.linalg.svd(restraint, full_matrices=False)

@@ -78,6 +78,7 @@ class StepControl:
             level=self.next_level(level, position, error, int(iterations.max())),
             last_level=level,
             peak=peak,
+            force=np.maximum(old.pace.force, dynamics.norm(new.inertia_a)),
             waited=old.pace.waited + 1,
         )
         pace, count = self._refreshed(pace, iterations, new.u, old.slip)

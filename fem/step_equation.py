@@ -19,6 +19,9 @@ from fem.dynamics import Dynamics
 from fem.generalized_alpha import Scheme
 from fem.motion import Effort, MotionState, SolvedStep, StepRecord
 
+_ROUNDOFF = 1e-10
+"""Share of the momentum that the residual of a step may not resolve: a body in free flight has no other force."""
+
 KEPT = 4
 """Displacements that the next one is extrapolated from; with more, the noise of the tolerance outweighs the gain."""
 
@@ -28,7 +31,8 @@ class StepProblem:
     """r(a) = L a + (1-af) f(u0 + b h^2 a, v0 + g h a) + constant = 0 for the a at the end of the step.
 
     Fields (n_dof, n_case); ``linear`` the force K u0 of the linear bodies; ``slip`` (n_point, 2, n_case) at the
-    beginning; ``guess`` the a to start from; ``number`` of the output that the step leads to.
+    beginning; ``guess`` the a to start from; ``number`` of the output that the step leads to; ``force`` (n_case,) N,
+    the largest of the inertia forces so far, the loads of this step, and what roundoff leaves of M v / h.
     """
 
     u0: FloatArray
@@ -38,12 +42,13 @@ class StepProblem:
     slip: FloatArray
     guess: FloatArray
     number: int
+    force: FloatArray
 
     def cases(self, chosen: IntArray) -> StepProblem:
         """The problem of some cases alone."""
         fields = (self.u0, self.v0, self.constant, self.linear, self.slip, self.guess)
         u0, v0, constant, linear, slip, guess = (np.ascontiguousarray(x[..., chosen]) for x in fields)
-        return StepProblem(u0, v0, constant, linear, slip, guess, self.number)
+        return StepProblem(u0, v0, constant, linear, slip, guess, self.number, self.force[chosen])
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,14 @@ class StepEquation:
         )
         v0 = old.v + h * (1.0 - s.gamma) * old.a
         linear = self.dynamics.linear.stiffness(u0)
-        return StepProblem(u0, v0, constant, linear, old.slip, (guess - u0) / (h * h * s.beta), old.step + 1)
+        first = (guess - u0) / (h * h * s.beta)
+        return StepProblem(u0, v0, constant, linear, old.slip, first, old.step + 1, self._force(old, p_new))
+
+    def _force(self, old: MotionState, load: FloatArray) -> FloatArray:
+        dynamics = self.dynamics
+        given = dynamics.norm(load - dynamics.model.load[:, None])
+        roundoff = _ROUNDOFF / self.step * dynamics.norm(old.inertia_v)
+        return np.asarray(np.maximum(np.maximum(old.pace.force, given), roundoff))
 
     def evaluate(self, a: FloatArray, problem: StepProblem) -> Trial:
         """Residual of the equation at a (n_dof, n_case) m/s^2."""
@@ -205,5 +217,7 @@ class StepEquation:
         af, (p_old, p_new) = self.scheme.alpha_f, loads
         damping = (1.0 - af) * (new.damping_v + new.viscous) + af * (old.damping_v + old.viscous)
         friction = self.dynamics.model.contact.dissipated(contact.traction, old.slip, contact.slip)
-        work = [np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, (1.0 - af) * p_new + af * p_old)]
-        return np.stack([friction, *work])
+        load = (1.0 - af) * p_new + af * p_old
+        damped, given = (np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, load))
+        given = given + self.dynamics.support_work(old, new, (self.scheme.alpha_m, af), load)
+        return np.stack([friction, damped, given])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from fem.arrays import FloatArray
 from fem.assembly import physical_gradients
 from fem.body import Body
 from fem.element import ReferenceElement, reference_element
+from fem.loads import Vector
+from fem.locate_point import cell_of_point
 from fem.model import Model
 
 
@@ -58,6 +61,20 @@ def nodal_stress(model: Model, u: FloatArray) -> Stress:
         at = _at_points(body, _displacement(model, u, index))
         parts.append([_averaged(body, tensor) for tensor in (at.second_piola, at.cauchy)])
     return Stress(model.points, *(np.concatenate(tensors) for tensors in zip(*parts, strict=True)))
+
+
+def point_stress(model: Model, u: FloatArray, points: Sequence[Vector]) -> Stress:
+    """Nodal stress interpolated at material points (n_point, 3) m, by the shape functions of the cell around each.
+
+    A point outside all bodies raises ``FemInputError`` with the nearest node.
+    """
+    nodal = nodal_stress(model, u)
+    tensors = np.empty((2, len(points), 3, 3))
+    for number, point in enumerate(points):
+        found = cell_of_point(model.bodies, model.offsets, point, where=f"stress at point {number}")
+        for kind, tensor in enumerate((nodal.second_piola, nodal.cauchy)):
+            tensors[kind, number] = np.einsum("a,aij->ij", found.shape, tensor[found.nodes])
+    return Stress(np.asarray(points, dtype=float), tensors[0], tensors[1])
 
 
 def _displacement(model: Model, u: FloatArray, index: int) -> FloatArray:

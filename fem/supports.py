@@ -77,7 +77,7 @@ def _axis(body: Body, region: str, support: Support, direction: str) -> int:
     normals = surface_points(body.mesh.points, body.mesh.surface(region)).normals
     axis = int(np.abs(normals[0]).argmax())
     if np.any(np.abs(normals[:, axis]) < 1.0 - _ALIGNED):
-        advice = "a support along the normal needs a plane that faces along x, y or z"
+        advice = "a support along the normal needs a plane that faces along x, y or z; a Foundation holds any other"
         raise FemInputError("not a plane across an axis", where=where, value="normal", advice=advice)
     return axis
 

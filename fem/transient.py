@@ -17,7 +17,7 @@ from fem.arrays import FloatArray
 from fem.corrector import Corrector
 from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError, FemInputError
-from fem.excitation import Amplitude, TimeLoad, base_load
+from fem.excitation import Amplitude, SupportMotion, TimeLoad, base_load
 from fem.generalized_alpha import Scheme
 from fem.linear_solver import SolverStatistics
 from fem.model import Model
@@ -39,7 +39,7 @@ class TransientSettings:
     ----------
     time_step : s, distance of the outputs and, unless halved or doubled, of the steps.
     spectral_radius : of generalised-alpha at infinite frequency.
-    tolerance : residual relative to ``force_scale`` at which a step counts as solved.
+    tolerance : residual at which a step counts as solved, relative to the force that ``Transient`` names.
     max_iterations : per step; more halve it.
     depth : pairs kept by Anderson acceleration.
     dispersion_correction : give the first modes ``corrected_modes`` the inertia with which the scheme oscillates at
@@ -86,8 +86,10 @@ class Transient:
 
     Parameters
     ----------
-    force_scale : N, to which residuals are compared: peak inertia force of the intended motion.
+    force_scale : N, to which residuals are compared, such as the peak inertia force of the intended motion; None: the
+        largest inertia force or load of the case so far, this step included.
     loads : forces that follow a function of time, on top of the dead loads of the model.
+    motions : supports that follow a function of time, see ``support_motion``.
     base_acceleration : t -> (n_case,) m/s^2 along ``base_direction``, or None.
 
     ``rest_energies`` (3, 1) J are kinetic, strain and contact energy of the equilibrium.
@@ -101,15 +103,16 @@ class Transient:
         damping: Rayleigh,
         settings: TransientSettings,
         *,
-        force_scale: float,
+        force_scale: float | None = None,
         loads: Sequence[TimeLoad] = (),
+        motions: Sequence[SupportMotion] = (),
         base_acceleration: Amplitude | None = None,
         base_direction: str = "y",
     ) -> None:
         self.model, self.equilibrium, self.settings = model, equilibrium, settings
         self.scheme = Scheme.from_radius(settings.spectral_radius)
         base = () if base_acceleration is None else (base_load(model, base_direction, base_acceleration),)
-        self.dynamics = Dynamics(model, equilibrium, damping, (*loads, *base))
+        self.dynamics = Dynamics(model, equilibrium, damping, (*loads, *base), motions)
         self.rest_energies = self.dynamics.rest_energies
         self._correction = self._modal_inertia(modes)
         self._equations: dict[int, StepEquation] = {}
@@ -135,13 +138,15 @@ class Transient:
         (M + c h^2 K) a = p - f - C v, which leaves slow modes alone to O((omega h)^2) and quiets those that the step
         does not resolve: they have a double root, so that what they start with grows as n rho^n before it decays.
         """
-        state = self.dynamics.start(displacement, velocity, slip, self.settings.solver)
+        dynamics, step = self.dynamics, self.settings.time_step
+        state = dynamics.start(displacement, velocity, slip, self.settings.solver, step)
         if settled:
             return state
         solve = self._preconditioner.prepare(0, state.pace, state.u)
-        net = state.inertia_a * self.dynamics.mask
-        a = (1.0 - self.scheme.alpha_m) * solve(net, np.arange(net.shape[1])) * self.dynamics.mask
-        inertia_a, damping_a = self.dynamics.mass_and_damping(a)
+        supports = state.a * (1.0 - dynamics.mask)
+        net = (state.inertia_a - dynamics.mass(supports)) * dynamics.mask
+        a = (1.0 - self.scheme.alpha_m) * solve(net, np.arange(net.shape[1])) * dynamics.mask + supports
+        inertia_a, damping_a = dynamics.mass_and_damping(a)
         return replace(state, a=a, inertia_a=inertia_a, damping_a=damping_a)
 
     def observe(self, state: MotionState) -> StepRecord:
@@ -227,8 +232,9 @@ class Transient:
 
     def _advance(self, equation: StepEquation, old: MotionState, level: int, anderson: Anderson) -> StepRecord:
         n_case, h, position = old.u.shape[1], self.settings.time_step, old.pace.position
-        loads = (self.dynamics.load(position * h, n_case), self.dynamics.load((position + 2.0**-level) * h, n_case))
-        guess = extrapolated(old.history, old.v * equation.step)
+        end = (position + 2.0**-level) * h
+        loads = (self.dynamics.load(position * h, n_case), self.dynamics.load(end, n_case))
+        guess = self.dynamics.held(extrapolated(old.history, old.v * equation.step), end)
         problem = equation.problem(old, guess, loads)
         record = equation.finish(old, problem, self._solve(equation, problem, level, old, anderson), loads)
         jerk = (record.state.a - old.a) / equation.step

@@ -10,8 +10,9 @@ import pytest
 import scipy.sparse as sp
 
 from fem.errors import FemConvergenceError, FemInputError
-from fem.linear_solver import available_solvers, make_solver
+from fem.linear_solver import SYMMETRIC_ONLY, available_solvers, make_solver
 from fem.sparse_product import SparseProduct
+from tests.fem.small_models import clamped_strip
 
 SOLVERS = available_solvers()
 
@@ -32,9 +33,34 @@ def test_solves_one_and_many_right_sides(name: str, symmetric: bool) -> None:
     # Condition number below 250: 1e-10 is the agreement asked of all solvers and leaves four digits of room.
     np.testing.assert_allclose(solver.solve(matrix @ x), x, atol=1e-10)
     np.testing.assert_allclose(solver.solve(matrix @ x[:, 0]), x[:, 0], atol=1e-10)
-    assert solver.statistics.name == name
+    if symmetric or name not in SYMMETRIC_ONLY:
+        assert solver.statistics.name == name
+    else:
+        assert solver.statistics.name not in SYMMETRIC_ONLY
     assert solver.statistics.solves == 2
     assert solver.statistics.factor_entries > matrix.nnz // 2
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_all_agree_on_a_strip_in_its_joints(name: str, symmetric: bool) -> None:
+    """Iteration matrix of a step of 0.1 ms of a strip in its joints, against SuperLU: 1e-10 of the largest.
+
+    The static tangent alone has a condition number of 1e7: there SuperLU differs from itself with another ordering by
+    4e-10.
+    """
+    model = clamped_strip()
+    closed = np.ones(model.contact.n_point, dtype=np.int64)
+    matrix = model.constrain(model.elastic_tangent(np.zeros(model.n_dof)))
+    matrix = matrix + model.constrain(model.contact.stick_tangent(closed) + 4.0 / 1e-4**2 * model.mass)
+    matrix = matrix.tocsr()
+    right = np.where(model.free, model.mass @ model.direction("y"), 0.0)
+    found = []
+    for solver in (make_solver(name, symmetric=symmetric), make_solver("superlu", symmetric=False)):
+        solver.analyse(matrix)
+        solver.factor(matrix)
+        found.append(solver.solve(right))
+    assert np.abs(found[0] - found[1]).max() < 1e-10 * np.abs(found[1]).max()
 
 
 @pytest.mark.parametrize("name", SOLVERS)
@@ -76,7 +102,7 @@ def test_singular_matrix_is_refused(name: str) -> None:
 
 def test_unknown_solver_lists_the_available_ones() -> None:
     with pytest.raises(FemInputError, match="superlu"):
-        make_solver("mumps", symmetric=True)
+        make_solver("umfpack", symmetric=True)
     assert make_solver(symmetric=True).name == SOLVERS[0]
 
 

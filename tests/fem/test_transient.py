@@ -13,6 +13,7 @@ from fem.model import Support
 from fem.modes import Rayleigh, solve_modes
 from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, solve_static
+from fem.step_equation import StepProblem, Trial
 from fem.transient import Transient, TransientSettings
 from fem.viscous_tangent import viscous_stiffness
 from tests.fem.conftest import Strip
@@ -113,8 +114,8 @@ def test_newton_contracts_quadratically(strip: Strip) -> None:
     seen: list[float] = []
     size = transient._corrector.size
 
-    def watched(residual: np.ndarray) -> np.ndarray:
-        found = size(residual)
+    def watched(trial: Trial, problem: StepProblem) -> np.ndarray:
+        found = size(trial, problem)
         seen.append(float(found[0]))
         return found
 

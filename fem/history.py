@@ -1,0 +1,103 @@
+"""What a transient showed over time: sensors, energies with their balance, resultants and status of the interfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.arrays import FloatArray
+from fem.central_difference import ExplicitTransient
+from fem.motion import MotionState, StepRecord
+from fem.transient import Transient
+
+
+@dataclass(frozen=True)
+class History:
+    """One march, from its first state on.
+
+    Attributes
+    ----------
+    t : (n_time,) s.
+    displacement, velocity, acceleration : (n_time, n_sensor, n_case) m from the equilibrium, m/s, m/s^2; the
+        acceleration of generalised-alpha lags by (alpha_m - alpha_f) h.
+    kinetic, strain, contact : (n_time, n_case) J, relative to the equilibrium.
+    friction, damping, external : (n_time, n_case) J, work since the first state; external that of loads and supports.
+    force : (n_time, n_pair, 3, n_case) N, resultant of the tractions of every pair on its master.
+    closed, slipping : (n_time, n_pair, n_case) m^2, area in contact and the part of it that slips.
+    state : to march on from.
+    """
+
+    t: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    kinetic: FloatArray
+    strain: FloatArray
+    contact: FloatArray
+    friction: FloatArray
+    damping: FloatArray
+    external: FloatArray
+    force: FloatArray
+    closed: FloatArray
+    slipping: FloatArray
+    state: MotionState
+
+    @property
+    def imbalance(self) -> FloatArray:
+        """Change of the stored energy plus friction and damping less external work, (n_time, n_case) J."""
+        stored = self.kinetic + self.strain + self.contact
+        return np.asarray(stored - stored[0] + self.friction + self.damping - self.external)
+
+
+Marching = Transient | ExplicitTransient
+
+
+def record_history(transient: Marching, state: MotionState, n_step: int, sensors: FloatArray) -> History:
+    """March ``n_step`` outputs from a state and keep what they show.
+
+    Parameters
+    ----------
+    sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
+
+    Raises as the march does; ``march_campaign`` hands on what a failed march computed.
+    """
+    last = transient.observe(state)
+    rows = [_row(last, transient, sensors)]
+    for record in transient.march(state, n_step):
+        rows.append(_row(record, transient, sensors))
+        last = record
+    columns = [np.stack(column) for column in zip(*rows, strict=True)]
+    motion, energies, done, force, areas = columns
+    done = done - state.work
+    return History(
+        t=np.asarray((state.step + np.arange(len(rows))) * transient.settings.time_step),
+        displacement=motion[:, 0],
+        velocity=motion[:, 1],
+        acceleration=motion[:, 2],
+        kinetic=energies[:, 0],
+        strain=energies[:, 1],
+        contact=energies[:, 2],
+        friction=done[:, 0],
+        damping=done[:, 1],
+        external=done[:, 2],
+        force=force,
+        closed=areas[:, 0],
+        slipping=areas[:, 1],
+        state=last.resume,
+    )
+
+
+def _row(record: StepRecord, transient: Marching, sensors: FloatArray) -> tuple[FloatArray, ...]:
+    state, contact = record.state, transient.model.contact
+    moved = state.u - transient.equilibrium.u[:, None]
+    traction = record.contact.traction.reshape(contact.n_point, 3, state.u.shape[1])
+    member = (contact.pair == np.arange(len(contact.names))[:, None]) * contact.area
+    status = record.contact.status
+    return (
+        np.stack([sensors @ moved, sensors @ state.v, sensors @ state.a]),
+        record.energies - transient.rest_energies,
+        state.work,
+        np.einsum("pg,gij,gic->pjc", member, contact.frame, traction),
+        np.stack([member @ (status > 0), member @ (status == 2)]),
+    )

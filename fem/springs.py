@@ -1,0 +1,174 @@
+"""Springs to the ground and between points, elastic foundations under surfaces, and masses at points.
+
+All are linear in the displacement: rows B, one stiffness k per row, K = B' k B, forces k B u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fem.arrays import FloatArray, IntArray
+from fem.body import locate
+from fem.errors import FemInputError
+from fem.interfaces import default_penalty
+from fem.loads import Assembly, Vector
+from fem.locate_point import cell_of_point
+from fem.pairing import surface_points
+
+RIGID = 1000.0
+"""Default bed in multiples of E / h: it gives way like a thousandth of a facet size of material."""
+
+
+@dataclass(frozen=True)
+class Foundation:
+    """An elastic bed under a surface "<body>.<surface>": tractions -k u in Pa, in tension too.
+
+    Attributes
+    ----------
+    normal : Pa/m along the normals of the undeformed surface; None: ``RIGID`` times E / h, which holds a plane of
+        symmetry of any direction, a cylinder radially, a sphere.
+    tangential : Pa/m across them; 0 lets the surface slide.
+    """
+
+    name: str
+    surface: str
+    normal: float | None = None
+    tangential: float = 0.0
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Stiffness (k_x, k_y, k_z) in N/m between a material point (m) and the ground, or a second material point ``to``.
+
+    The force is -k times the (relative) displacement along each axis, whatever the distance of the points.
+    """
+
+    name: str
+    point: Vector
+    stiffness: Vector
+    to: Vector | None = None
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A mass in kg that moves with a material point (m), without rotary inertia."""
+
+    name: str
+    point: Vector
+    mass: float
+
+
+@dataclass(frozen=True)
+class SpringSet:
+    """All springs and foundations of a model.
+
+    Attributes
+    ----------
+    operator : B, (n_row, n_dof); stiffness : (n_row,) N/m.
+    names : of the springs and foundations; owner : (n_row,) index into them.
+    axes : (n_row, 3) unit vectors along which the rows act.
+    """
+
+    operator: sp.csr_matrix
+    stiffness: FloatArray
+    names: tuple[str, ...]
+    owner: IntArray
+    axes: FloatArray
+
+    @property
+    def matrix(self) -> sp.csr_matrix:
+        """B' k B, (n_dof, n_dof) N/m."""
+        return (self.operator.T @ sp.diags(self.stiffness) @ self.operator).tocsr()
+
+    def forces(self, u: FloatArray) -> dict[str, FloatArray]:
+        """Resultant (3,) in N with which each acts on its surface or ``point`` at u (n_dof,) m, by name."""
+        pull = -(self.stiffness * (self.operator @ u))[:, None] * self.axes
+        return {name: np.asarray(pull[self.owner == number].sum(axis=0)) for number, name in enumerate(self.names)}
+
+
+Elastic = Foundation | Spring
+
+
+def spring_set(elastic: Sequence[Elastic], assembly: Assembly) -> SpringSet:
+    """Rows and stiffnesses; unknown names, points outside all bodies and negative numbers raise ``FemInputError``."""
+    n_dof = 3 * len(assembly.points)
+    rows, stiffness, axes = [sp.csr_matrix((0, n_dof))], [np.empty(0)], [np.empty((0, 3))]
+    for item in elastic:
+        operator, k, along = _bed(item, assembly) if isinstance(item, Foundation) else _spring(item, assembly)
+        if not (np.isfinite(k).all() and (k >= 0.0).all()):
+            value = item.stiffness if isinstance(item, Spring) else (item.normal, item.tangential)
+            raise FemInputError("stiffness must not be negative", where=f"spring {item.name}", value=value)
+        rows.append(operator[k > 0.0])
+        stiffness.append(k[k > 0.0])
+        axes.append(along[k > 0.0])
+    owner = np.repeat(np.arange(len(elastic)), [len(k) for k in stiffness[1:]])
+    names = tuple(item.name for item in elastic)
+    return SpringSet(sp.vstack(rows).tocsr(), np.concatenate(stiffness), names, owner, np.vstack(axes))
+
+
+def _bed(bed: Foundation, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArray, FloatArray]:
+    index, surface = locate(assembly.bodies, bed.surface)
+    body, offset = assembly.bodies[index], assembly.offsets[index]
+    facets = body.mesh.surface(surface)
+    at = surface_points(assembly.points, facets + offset)
+    normal = RIGID * default_penalty(body, facets) if bed.normal is None else bed.normal
+    frame = np.stack([at.normals, *_tangents(at.normals)], axis=1)
+    k = at.area[:, None] * np.array([normal, bed.tangential, bed.tangential])
+    rows = np.repeat(np.arange(3 * len(at.area)), 3 * at.nodes.shape[1])
+    columns = np.broadcast_to((3 * at.nodes[:, None, :, None] + np.arange(3)), (*frame.shape[:2], at.nodes.shape[1], 3))
+    values = at.shape[:, None, :, None] * frame[:, :, None, :]
+    shape = (3 * len(at.area), 3 * len(assembly.points))
+    operator = sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=shape)
+    return operator, k.ravel(), frame.reshape(-1, 3)
+
+
+def _tangents(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors across every normal (n, 3)."""
+    helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, helper)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return first, np.cross(normals, first)
+
+
+def _spring(spring: Spring, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArray, FloatArray]:
+    where = f"spring {spring.name}"
+    operator = _point_rows(spring.point, assembly, where)
+    if spring.to is not None:
+        operator = operator - _point_rows(spring.to, assembly, where)
+    return operator, np.asarray(spring.stiffness, dtype=float), np.eye(3)
+
+
+def _point_rows(point: Vector, assembly: Assembly, where: str) -> sp.csr_matrix:
+    """Displacement of a material point, (3, n_dof)."""
+    found = cell_of_point(assembly.bodies, assembly.offsets, point, where=where)
+    axis = np.arange(3)
+    columns = 3 * found.nodes[None, :] + axis[:, None]
+    rows = np.broadcast_to(axis[:, None], columns.shape)
+    values = np.broadcast_to(found.shape, columns.shape)
+    return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3, 3 * len(assembly.points)))
+
+
+def point_mass_matrix(masses: Sequence[PointMass], assembly: Assembly) -> sp.csr_matrix:
+    """Sum of m N' N over the masses, (n_dof, n_dof) kg; a mass that is not positive raises ``FemInputError``."""
+    n_dof = 3 * len(assembly.points)
+    total = sp.csr_matrix((n_dof, n_dof))
+    for item in masses:
+        where = f"point mass {item.name}"
+        if not (np.isfinite(item.mass) and item.mass > 0.0):
+            raise FemInputError("mass must be positive", where=where, value=item.mass)
+        rows = _point_rows(item.point, assembly, where)
+        total = total + item.mass * (rows.T @ rows)
+    return total.tocsr()
+
+
+def lumped_point_masses(masses: Sequence[PointMass], assembly: Assembly) -> FloatArray:
+    """The masses shared out to the nodes of their cells by N^2, (n_node,) kg: none is negative, their sum is kept."""
+    nodal = np.zeros(len(assembly.points))
+    for item in masses:
+        found = cell_of_point(assembly.bodies, assembly.offsets, item.point, where=f"point mass {item.name}")
+        nodal[found.nodes] += item.mass * found.shape**2 / (found.shape @ found.shape)
+    return nodal
