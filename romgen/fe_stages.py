@@ -22,11 +22,14 @@ from fem.model import (
     Body,
     Bolt,
     Clamp,
+    Foundation,
     Gravity,
     Model,
     Pair,
     PointForce,
+    PointMass,
     Pressure,
+    Spring,
     Support,
     Tie,
     Traction,
@@ -39,9 +42,11 @@ from fem.preload import solve_preload as tighten
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
 from fem.sliding import SlidingWarning
+from fem.springs import Elastic
 from fem.stress import nodal_stress
 from romgen.arrays import IntArray
 from romgen.errors import InputError, NumericalError
+from romgen.fe_inputs import still, time_loads
 from romgen.progress import Report
 from romgen.settings import BlockSettings, LoadSettings, MeshSettings, Study, named_surfaces, unknown
 from romgen.structure import RATIO_TOLERANCE, FrequencyRatio, Interface, Modes, Preload, Structure
@@ -73,9 +78,21 @@ def build(study: Study) -> Model:
     pairs = [Pair(name, **contact.model_dump()) for name, contact in study.contacts.items()]
     ties = [Tie(name, **tie.model_dump()) for name, tie in study.ties.items()]
     bolts = [Bolt(name, **bolt.model_dump()) for name, bolt in study.bolts.items()]
+    springs: list[Elastic] = [Spring(name, **spring.model_dump()) for name, spring in study.springs.items()]
+    springs += [Foundation(name, **bed.model_dump()) for name, bed in study.foundations.items()]
+    masses = [PointMass(name, **mass.model_dump()) for name, mass in study.point_masses.items()]
     supports = [Support(c.surface, tuple(c.directions), c.displacement or 0.0) for c in study.constraints]
     loads = [_load(table) for table in study.loads]
-    return build_model(bodies, pairs=pairs, supports=supports, loads=loads, ties=ties, bolts=bolts)
+    return build_model(
+        bodies,
+        pairs=pairs,
+        supports=supports,
+        loads=loads,
+        ties=ties,
+        bolts=bolts,
+        springs=springs,
+        point_masses=masses,
+    )
 
 
 def _load(table: LoadSettings) -> Load:
@@ -225,10 +242,7 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
     model = preloaded(study, preload)
     basis = tangent_modes(model, equilibrium(model, preload), study.modes.count)
     damping = _damping(study, basis)
-    base = study.base_acceleration
-    # The whole mass matrix: the moving supports drag their neighbours along by its off-diagonal terms too.
-    whole = -basis.shapes.T @ (model.mass @ model.direction(base.direction)) if base else None
-    inertia = np.empty((study.modes.count, 0)) if whole is None else whole
+    loads = [load.pattern for load in time_loads(study, model, dict.fromkeys(study.load_inputs, still))]
     sensors = [Sensor(name, table.point, table.direction) for name, table in study.sensors.items()]
     frequency = basis.omega / (2.0 * np.pi)
     near = near_integer_ratios(frequency, tolerance=RATIO_TOLERANCE)
@@ -237,9 +251,9 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
         damping_ratio=damping_ratios(basis, damping),
         shapes=basis.shapes,
         left=basis.left,
-        modal_load=inertia.reshape(study.modes.count, -1),
-        inputs=("base_acceleration",) if base else (),
-        input_units=("m/s2",) if base else (),
+        modal_load=basis.shapes.T @ np.column_stack([np.empty((model.n_dof, 0)), *loads]),
+        inputs=tuple(study.load_inputs),
+        input_units=tuple(study.load_inputs.values()),
         sensors=tuple(study.sensors),
         sensor_matrix=sensor_rows(model, sensors),
         alpha=damping.alpha,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
+import scipy.sparse as sp
 
 from fem.campaign import (
     CampaignSegment,
@@ -17,11 +20,13 @@ from fem.campaign import (
     snap_back_starts,
 )
 from fem.central_difference import ExplicitSettings, ExplicitTransient
+from fem.excitation import Amplitude
 from fem.modes import ModalBasis, Rayleigh
 from fem.transient import Transient, TransientSettings
 from romgen.arrays import FloatArray
 from romgen.differences import DROPPED, first_derivative, second_derivative
 from romgen.errors import InputError
+from romgen.fe_inputs import time_loads
 from romgen.fe_stages import equilibrium, preloaded, translated
 from romgen.forced_motion import ForcedMotion
 from romgen.settings import RingDownSettings, Study
@@ -56,9 +61,9 @@ def march_forced(
     motion: ForcedMotion,
     restart: CampaignSegment | None,
 ) -> Iterator[CampaignSegment]:
-    """Yield the missing segments of motions under base acceleration a_c cos(Omega_c t), all cases together."""
+    """Yield the missing segments of motions under functions of time of the load inputs, all cases together."""
     with translated():
-        transient, basis = _transient(study, preload, modes, motion.base_acceleration)
+        transient, basis = _transient(study, preload, modes, motion.loads)
         starts = moving_starts(transient.equilibrium, motion.displacement, motion.velocity)
         yield from march_campaign(
             transient,
@@ -71,7 +76,7 @@ def march_forced(
 
 
 def _transient(
-    study: Study, preload: Preload, modes: Modes, base: Callable[[float], FloatArray] | None = None
+    study: Study, preload: Preload, modes: Modes, inputs: Mapping[str, Amplitude] = MappingProxyType({})
 ) -> tuple[Transient | ExplicitTransient, ModalBasis]:
     """The model of a study ready to march by the table [ringdowns], and its modes."""
     table = _ringdowns(study)
@@ -81,11 +86,10 @@ def _transient(
     tangents = (model.elastic_tangent(state.u), model.elastic_tangent(state.u, geometric=False))
     basis = ModalBasis(omega, modes.shapes, modes.left, *tangents)
     damping = Rayleigh(modes.alpha, modes.beta)
-    direction = "y" if study.base_acceleration is None else study.base_acceleration.direction
     if table.scheme == "central_difference":
         explicit = ExplicitSettings(table.time_step, table.explicit_step)
-        march = ExplicitTransient(model, state, damping, explicit, base_acceleration=base, base_direction=direction)
-        return march, basis
+        lumped = replace(model, mass=sp.diags(model.lumped_mass()).tocsr())
+        return ExplicitTransient(model, state, damping, explicit, loads=time_loads(study, lumped, inputs)), basis
     etas = _start_coordinates(study, basis)
     count = len(etas[0])
     inertia = [np.linalg.norm(modes.left[:, :count] @ (omega[:count] ** 2 * eta)) for eta in etas]
@@ -96,8 +100,7 @@ def _transient(
         damping,
         _implicit_settings(table, count),
         force_scale=float(max(inertia)),
-        base_acceleration=base,
-        base_direction=direction,
+        loads=time_loads(study, model, inputs),
     )
     return transient, basis
 

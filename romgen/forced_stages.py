@@ -10,6 +10,7 @@ from romgen.forced_curve import ForcedResponse
 from romgen.forced_response import forced_response
 from romgen.forced_validation import ForcedValidation, compare, forced_motion, operating_points
 from romgen.learning_stages import learned, learned_model
+from romgen.load_histories import LoadHistories, compare_history, history_motion
 from romgen.model_stages import finite_elements, march, ringdown_settings
 from romgen.settings import Study
 from romgen.stage import Context, Stage
@@ -29,7 +30,17 @@ class Backbones:
 
 
 def forced_stages(study: Study) -> tuple[Stage, ...]:
-    """Return the stages: without levels there is no forced response."""
+    """Return the stages: without levels there is no forced response, without histories no march under them."""
+    histories: tuple[Stage, ...] = ()
+    if study.load_histories and study.data is None:
+        upstream: tuple[str, ...] = ("preload", "modes", "ringdowns", "learn")
+        histories = (
+            Stage("load_histories", LoadHistories, upstream, ("ringdowns", "load_histories"), march_histories),
+        )
+    return (*_harmonic_stages(study), *histories)
+
+
+def _harmonic_stages(study: Study) -> tuple[Stage, ...]:
     backbones = Stage("backbone", Backbones, ("learn",), (), compute_backbones)
     if not study.forced_response.levels:
         return (backbones,)
@@ -67,6 +78,25 @@ def validate_forced(context: Context) -> ForcedValidation:
         tuple(
             compare(model, point, t, displacement[:, column, case], response.sensor, response.measure)
             for case, point in enumerate(points)
+        )
+    )
+
+
+def march_histories(context: Context) -> LoadHistories:
+    """March the finite-element model under all load histories together, and compare with the reduced model."""
+    study, tables = context.study, context.study.load_histories
+    model, step = learned_model(context), ringdown_settings(context.study).time_step
+    preload, modes = context.record("preload", Preload), context.record("modes", Modes)
+    motion = history_motion(tables, len(modes.shapes), step)
+    fe = finite_elements("fe_transients")
+    segments = march(
+        context, fe.Segment, lambda last: fe.march_forced(study, preload, modes, motion, last), motion.n_step * step
+    )
+    t, displacement = fe.join_sensors(segments, study)
+    return LoadHistories(
+        tuple(
+            compare_history(model, name, table, t, displacement[:, :, case])
+            for case, (name, table) in enumerate(tables.items())
         )
     )
 

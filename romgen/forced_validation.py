@@ -1,4 +1,4 @@
-"""The reduced model against the finite-element model under base acceleration, point by point.
+"""The reduced model against the finite-element model under a harmonic load, point by point.
 
 Both start from the same periodic motion of the reduced model, lifted to all degrees of freedom, and are forced for the
 same time: were the reduced model exact, both would stay on that orbit.
@@ -13,7 +13,7 @@ import numpy as np
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.forced_curve import ForcedCurve, ForcedResponse
-from romgen.forced_motion import ForcedMotion
+from romgen.forced_motion import ForcedMotion, cosine
 from romgen.lifted_orbit import Measure
 from romgen.manifold import Manifold, lift
 from romgen.reduced_model import ReducedModel
@@ -28,8 +28,9 @@ MEASURED_PERIODS = 5
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A stable forced motion of the reduced model: load level cos(2 pi f t), state z at t = 0."""
+    """A stable forced motion of the reduced model: load level cos(2 pi f t) on ``input``, state z at t = 0."""
 
+    input: str
     level: float
     unit: str
     frequency_hz: float
@@ -42,7 +43,7 @@ class ForcedPoint:
 
     Attributes
     ----------
-    load, unit, frequency_hz : load cos(2 pi f t) of the base acceleration.
+    load, unit, frequency_hz : load cos(2 pi f t) on ``input``.
     sensor, measure : what is compared.
     rom_m, fe_m : that measure over the last five periods, m; error_percent : 100 (rom_m / fe_m - 1).
     drift_percent : change of fe_m over the second half of the run; where it is not small the error still grows.
@@ -58,6 +59,7 @@ class ForcedPoint:
     fe_m: float
     error_percent: float
     drift_percent: float
+    input: str
     t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
     rom: FloatArray = field(metadata={"unit": "m", "axes": "time"})
     fe: FloatArray = field(metadata={"unit": "m", "axes": "time"})
@@ -101,14 +103,14 @@ def _settled(model: ReducedModel, curve: ForcedCurve, row: int) -> OperatingPoin
     frequency = float(curve.frequency_hz[row])
     periods = int(np.ceil(SETTLING / np.abs(model.eigenvalues.real).min() * frequency))
     t = np.arange(periods * SAMPLES + 1) / (SAMPLES * frequency)
-    z = simulate(model, t, curve.q[row], _cosine(model, curve.level, frequency, t))
-    return OperatingPoint(curve.level, curve.unit, frequency, z[-1])
+    z = simulate(model, t, curve.q[row], _cosine(model, curve.input, curve.level, frequency, t))
+    return OperatingPoint(curve.input, curve.level, curve.unit, frequency, z[-1])
 
 
-def _cosine(model: ReducedModel, level: float, frequency_hz: float, t: FloatArray) -> FloatArray:
-    """Samples of the load on the first input, (n_time, n_input)."""
+def _cosine(model: ReducedModel, name: str, level: float, frequency_hz: float, t: FloatArray) -> FloatArray:
+    """Samples of the load on one input, (n_time, n_input)."""
     u = np.zeros((len(t), len(model.inputs)))
-    u[:, 0] = level * np.cos(2.0 * np.pi * frequency_hz * t)
+    u[:, model.inputs.index(name)] = level * np.cos(2.0 * np.pi * frequency_hz * t)
     return u
 
 
@@ -122,17 +124,15 @@ def forced_motion(model: ReducedModel, full: Manifold, points: tuple[OperatingPo
     displacement, velocity = [], []
     for point in points:
         t = np.array([0.0, step])
-        z = simulate(model, t, point.z, _cosine(model, point.level, point.frequency_hz, t))
+        z = simulate(model, t, point.z, _cosine(model, point.input, point.level, point.frequency_hz, t))
         x = lift(full, coordinates(model, z))
         displacement.append(x[0])
         velocity.append((x[1] - x[0]) / step)
-    return ForcedMotion(
-        np.stack(displacement, axis=1),
-        np.stack(velocity, axis=1),
-        np.array([point.level for point in points]),
-        2.0 * np.pi * np.array([point.frequency_hz for point in points]),
-        n_step,
-    )
+    level = np.array([point.level for point in points])
+    omega = 2.0 * np.pi * np.array([point.frequency_hz for point in points])
+    # All points belong to one frequency response, and that to one input.
+    loads = {points[0].input: cosine(level, omega)}
+    return ForcedMotion(np.stack(displacement, axis=1), np.stack(velocity, axis=1), loads, n_step)
 
 
 def compare(
@@ -140,7 +140,7 @@ def compare(
 ) -> ForcedPoint:
     """Run the reduced model over t (n_time,) from the same state and compare the sensor with fe (n_time,)."""
     fine = np.arange(int(np.ceil(t[-1] * SAMPLES * point.frequency_hz)) + 1) / (SAMPLES * point.frequency_hz)
-    z = simulate(model, fine, point.z, _cosine(model, point.level, point.frequency_hz, fine))
+    z = simulate(model, fine, point.z, _cosine(model, point.input, point.level, point.frequency_hz, fine))
     rom = np.interp(t, fine, sensors(model, z)[0][:, model.sensors.index(sensor)])
     period = 1.0 / point.frequency_hz
     rom_m, fe_m = (_measure(t, x, t[-1], period, measure) for x in (rom, fe))
@@ -155,6 +155,7 @@ def compare(
         fe_m=fe_m,
         error_percent=100.0 * (rom_m / fe_m - 1.0),
         drift_percent=100.0 * (fe_m / halfway - 1.0),
+        input=point.input,
         t=t,
         rom=rom,
         fe=fe,

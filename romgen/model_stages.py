@@ -22,7 +22,19 @@ if TYPE_CHECKING:
 Segment = TypeVar("Segment", bound="DataclassInstance")
 log = logging.getLogger(__name__)
 
-MODEL_TABLES = ("materials", "blocks", "meshes", "regions", "contacts", "ties", "bolts", "constraints")
+MODEL_TABLES = (
+    "materials",
+    "blocks",
+    "meshes",
+    "regions",
+    "contacts",
+    "ties",
+    "bolts",
+    "springs",
+    "foundations",
+    "point_masses",
+    "constraints",
+)
 
 
 @dataclass(frozen=True)
@@ -58,7 +70,7 @@ def model_stages(study: Study) -> tuple[Stage, ...]:
     return (
         Stage("mesh", Structure, (), MODEL_TABLES, build_mesh),
         Stage("preload", Preload, ("mesh",), ("loads", "preload"), solve_preload),
-        Stage("modes", Modes, ("preload",), ("modes", "sensors", "base_acceleration"), solve_modes),
+        Stage("modes", Modes, ("preload",), ("modes", "sensors", "base_acceleration", "excitations"), solve_modes),
         Stage("ringdowns", RingDowns, ("modes",), ("ringdowns", "learn.master_modes"), march_ringdowns),
     )
 

@@ -12,6 +12,7 @@ from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
 from romgen.learn import Learned
 from romgen.learning_stages import learned
+from romgen.load_histories import LoadHistories
 from romgen.model_stages import RingDowns
 from romgen.polar_form import polar_text
 from romgen.provenance import Provenance, collect_provenance
@@ -53,6 +54,7 @@ def report_inputs(context: Context) -> ReportInputs:
     validation = _optional(context, "validation", Validation)
     backbones = _optional(context, "backbone", Backbones)
     forced = _optional(context, "forced_validation", ForcedValidation)
+    histories = _optional(context, "load_histories", LoadHistories)
     record = learned(context)
     return ReportInputs(
         study=study.name,
@@ -69,6 +71,7 @@ def report_inputs(context: Context) -> ReportInputs:
         orders=_orders(record),
         forced=_optional(context, "forced_response", ForcedResponse),
         forced_points=() if forced is None else forced.points,
+        histories=() if histories is None else histories.histories,
         backbones=() if backbones is None else backbones.curves,
         sensor=study.forced_response.sensor,
         measure=study.forced_response.measure,

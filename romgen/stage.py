@@ -15,7 +15,7 @@ from romgen.errors import InputError
 from romgen.progress import Report
 from romgen.result_store import ResultStore, StageInfo
 from romgen.segments import SegmentStore
-from romgen.settings import DataSettings, FmuSettings, MeshSettings, Settings, Study
+from romgen.settings import DataSettings, FmuSettings, LoadHistorySettings, MeshSettings, Settings, Study
 from romgen.source_digest import source_digest
 from romgen.store import SCHEMA_VERSION
 
@@ -120,6 +120,8 @@ def table_content(study: Study, table: str) -> Any:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, LoadHistorySettings) and value.file is not None:
+        return {**value.model_dump(mode="json"), "file": _file_sha256(value.file)}
     if isinstance(value, MeshSettings):
         return {**value.model_dump(mode="json"), "file": _file_sha256(value.file)}
     if isinstance(value, Settings):

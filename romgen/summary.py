@@ -16,6 +16,7 @@ from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
 from romgen.learning_stages import learning_summary
+from romgen.load_histories import LoadHistories
 from romgen.model_stages import RingDowns
 from romgen.runner import RunResult
 from romgen.stage import Context, study_key
@@ -130,9 +131,26 @@ def _forced_response(context: Context) -> dict[str, Any]:
 
 
 def _forced_validation(context: Context) -> list[dict[str, Any]]:
-    keys = ("load", "unit", "frequency_hz", "sensor", "measure", "rom_m", "fe_m", "error_percent", "drift_percent")
+    keys = (
+        "input",
+        "load",
+        "unit",
+        "frequency_hz",
+        "sensor",
+        "measure",
+        "rom_m",
+        "fe_m",
+        "error_percent",
+        "drift_percent",
+    )
     points = context.record("forced_validation", ForcedValidation).points
     return [{key: getattr(point, key) for key in keys} for point in points]
+
+
+def _load_histories(context: Context) -> list[dict[str, Any]]:
+    keys = ("name", "input", "unit", "nmte_percent", "rom_peak_m", "fe_peak_m", "range_share")
+    histories = context.record("load_histories", LoadHistories).histories
+    return [{key: getattr(item, key) for key in keys} for item in histories]
 
 
 def _backbone(context: Context) -> dict[str, Any]:
@@ -174,6 +192,7 @@ PARTS: dict[str, tuple[str, Callable[[Context], Any]]] = {
     "learn": ("learn", learning_summary),
     "forced_response": ("forced_response", _forced_response),
     "forced_validation": ("forced_validation", _forced_validation),
+    "load_histories": ("load_histories", _load_histories),
     "backbone": ("backbone", _backbone),
     "fmu": ("fmu", _export),
     "validation": ("fmu", _validation),

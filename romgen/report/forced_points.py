@@ -31,7 +31,14 @@ def forced_points_table(points: tuple[ForcedPoint, ...]) -> TableBlock:
         "amplitude of the finite-element model still changed over the second half; where it is not small, its own "
         "orbit lies further off."
     )
-    header = ("base acceleration", "frequency [Hz]", "reduced [mm]", "finite elements [mm]", "error [%]", "drift [%]")
+    header = (
+        first.input.replace("_", " "),
+        "frequency [Hz]",
+        "reduced [mm]",
+        "finite elements [mm]",
+        "error [%]",
+        "drift [%]",
+    )
     return TableBlock(caption, header, rows)
 
 
@@ -59,5 +66,5 @@ def forced_points_figure(points: tuple[ForcedPoint, ...]) -> FigureBlock:
         )
         for number, point in enumerate(points, 1)
     )
-    caption = "Last periods of the forced motions in both models, under the same base acceleration from the same start."
+    caption = "Last periods of the forced motions in both models, under the same load from the same start."
     return FigureBlock("forced_points", figure, caption, tables)

@@ -14,6 +14,7 @@ from romgen.fmu.records import FmuCheck, FmuExport, FmuLevels
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_validation import ForcedPoint
 from romgen.lifted_orbit import Measure
+from romgen.load_histories import HistoryComparison
 from romgen.provenance import Provenance
 from romgen.reduced_model import ReducedModel
 from romgen.settings import AcceptanceSettings
@@ -82,6 +83,7 @@ class ReportInputs:
     orders : the polynomial orders that were tried.
     forced : frequency response at all levels.
     forced_points : points of it that the finite-element model computed too.
+    histories : load histories that both models followed.
     backbones : free vibration of the reduced model, one per mode and kind.
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
     fmu_export, pythonfmu_export, fmu_check : the exported units and how well they repeat the Python model.
@@ -109,6 +111,7 @@ class ReportInputs:
     orders: tuple[OrderTrial, ...] = ()
     forced: ForcedResponse | None = None
     forced_points: tuple[ForcedPoint, ...] = ()
+    histories: tuple[HistoryComparison, ...] = ()
     backbones: tuple[Backbone, ...] = ()
     sensor: str | None = None
     measure: Measure = "sqrt2_rms"

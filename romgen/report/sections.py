@@ -15,6 +15,7 @@ from romgen.report.cost_figures import cost_figure, cost_table
 from romgen.report.fmu_tables import check_table, export_table, levels_table, problem_listing, replay_table
 from romgen.report.forced_figures import modal_figure, response_figure, response_table
 from romgen.report.forced_points import forced_points_figure, forced_points_table
+from romgen.report.history_figures import history_figure, history_table
 from romgen.report.inputs import ReportInputs
 from romgen.report.instantaneous_figures import instantaneous_figure, long_enough
 from romgen.report.mode_tables import frequency_table, ratio_table
@@ -134,6 +135,13 @@ def forced_section(inputs: ReportInputs) -> Section | None:
     return Section("forced", "Forced response", blocks)
 
 
+def history_section(inputs: ReportInputs) -> Section | None:
+    """Load histories in both models."""
+    if not inputs.histories:
+        return None
+    return Section("histories", "Load histories", (history_table(inputs.histories), history_figure(inputs.histories)))
+
+
 def backbone_section(inputs: ReportInputs) -> Section | None:
     """Free vibration of the reduced model."""
     if not inputs.backbones:
@@ -206,6 +214,7 @@ BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
     model_section,
     energy_section,
     forced_section,
+    history_section,
     backbone_section,
     fmu_section,
     cost_section,

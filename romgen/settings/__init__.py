@@ -9,6 +9,7 @@ from romgen.settings.finite_elements import (
     BaseAccelerationSettings,
     BlockSettings,
     ConstraintSettings,
+    ExcitationSettings,
     LoadSettings,
     MaterialSettings,
     ModesSettings,
@@ -17,20 +18,29 @@ from romgen.settings.finite_elements import (
     RingDownStart,
     SensorSettings,
 )
-from romgen.settings.joints import BoltSettings, ContactSettings, TieSettings
+from romgen.settings.joints import (
+    BoltSettings,
+    ContactSettings,
+    FoundationSettings,
+    PointMassSettings,
+    SpringSettings,
+    TieSettings,
+)
 from romgen.settings.learning import (
     AcceptanceSettings,
     FmuSettings,
     ForcedResponseSettings,
     ForcedValidationSettings,
     LearnSettings,
+    LoadHistorySettings,
     ReportSettings,
 )
 from romgen.settings.load import StudyError, load_study
 from romgen.settings.mesh_files import MeshSettings, RegionSettings
-from romgen.settings.study import Study, StudySettings
+from romgen.settings.study import BASE_ACCELERATION, Study, StudySettings
 
 __all__ = [
+    "BASE_ACCELERATION",
     "AcceptanceSettings",
     "ArchSettings",
     "BaseAccelerationSettings",
@@ -40,14 +50,18 @@ __all__ = [
     "ContactSettings",
     "DataSettings",
     "Estimate",
+    "ExcitationSettings",
     "FmuSettings",
     "ForcedResponseSettings",
     "ForcedValidationSettings",
+    "FoundationSettings",
     "LearnSettings",
+    "LoadHistorySettings",
     "LoadSettings",
     "MaterialSettings",
     "MeshSettings",
     "ModesSettings",
+    "PointMassSettings",
     "PreloadSettings",
     "RegionSettings",
     "ReportSettings",
@@ -55,6 +69,7 @@ __all__ = [
     "RingDownStart",
     "SensorSettings",
     "Settings",
+    "SpringSettings",
     "Study",
     "StudyError",
     "StudySettings",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator
 from itertools import product
 
@@ -11,13 +12,14 @@ import numpy as np
 from romgen.settings.data import DataSettings
 from romgen.settings.finite_elements import BlockSettings, RingDownSettings
 from romgen.settings.learning import FmuSettings
-from romgen.settings.study import Study
+from romgen.settings.study import BASE_ACCELERATION, Study
 
 PLATFORMS = ("host", "all", "linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin")
 PNG = b"\x89PNG\r\n\x1a\n"
 # Plausible solids, foam to tungsten; outside of it the unit system is probably not SI.
 DENSITY_RANGE = (50.0, 25_000.0)
 YOUNG_MODULUS_RANGE = (1e6, 2e12)
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # Two starts closer than 1 degree in amplitude space are the same motion at another level.
 SAME_MIX = np.cos(np.deg2rad(1.0))
 
@@ -57,8 +59,12 @@ def named_surfaces(study: Study) -> tuple[tuple[str, str], ...]:
     joints += [(f"[ties.{name}]", tie.slave, tie.master) for name, tie in study.ties.items()]
     named = [(f"{where} slave:", slave) for where, slave, _ in joints]
     named += [(f"{where} master:", master) for where, _, master in joints]
+    named += [(f"[foundations.{name}] surface:", bed.surface) for name, bed in study.foundations.items()]
     named += [(f"[constraints[{k}]] surface:", item.surface) for k, item in enumerate(study.constraints)]
     named += [(f"[loads[{k}]] surface:", item.surface) for k, item in enumerate(study.loads) if item.surface]
+    named += [
+        (f"[excitations.{name}] surface:", item.surface) for name, item in study.excitations.items() if item.surface
+    ]
     return tuple(named)
 
 
@@ -76,6 +82,7 @@ def _model_checks(study: Study) -> tuple[Iterator[str], ...]:
         _surface_problems(study),
         _contact_problems(study),
         _sensor_problems(study),
+        _excitation_problems(study),
         _mode_problems(study),
         _ringdown_problems(study.ringdowns, len(study.learn.master_modes)),
     )
@@ -128,6 +135,18 @@ def _sensor_problems(study: Study) -> Iterator[str]:
     for name, sensor in study.sensors.items():
         if not study.meshes and not any(_inside(block, sensor.point) for block in study.blocks.values()):
             yield f"[sensors.{name}] point lies in no block; got {list(sensor.point)} m"
+
+
+def _excitation_problems(study: Study) -> Iterator[str]:
+    for name, table in study.excitations.items():
+        where = f"[excitations.{name}]"
+        if not _IDENTIFIER.fullmatch(name):
+            yield f"{where} the name becomes a variable of the FMU: letters, digits and underscores; got '{name}'"
+        if name in (BASE_ACCELERATION, *study.sensors):
+            yield f"{where} the name is taken by another input or a sensor; choose another"
+        point = None if study.meshes else table.point
+        if point is not None and not any(_inside(block, point) for block in study.blocks.values()):
+            yield f"{where} point lies in no block; got {list(point)} m"
 
 
 def _inside(block: BlockSettings, point: tuple[float, float, float]) -> bool:
@@ -202,12 +221,19 @@ def _downstream_problems(study: Study) -> Iterator[str]:
     forced, known = study.forced_response, study.sensor_names
     if forced.sensor is not None and forced.sensor not in known:
         yield unknown("[forced_response] sensor:", "sensor", forced.sensor, known)
-    inputs = ("base_acceleration",) if study.base_acceleration is not None else ()
-    if forced.levels and forced.input not in inputs:
-        yield unknown("[forced_response] input:", "load input", forced.input, inputs)
+    if forced.levels and forced.input not in study.load_inputs:
+        yield unknown("[forced_response] input:", "load input", forced.input, study.load_inputs)
     if study.forced_validation is not None and (study.data is not None or not forced.levels):
         yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"
-    yield from _fmu_problems(study.fmu, inputs, known)
+    for name, history in study.load_histories.items():
+        where = f"[load_histories.{name}]"
+        if study.data is not None:
+            yield f"{where} needs a finite-element model; remove the table"
+        elif history.input not in study.load_inputs:
+            yield unknown(f"{where} input:", "load input", history.input, study.load_inputs)
+        if history.file is not None and not history.file.is_file():
+            yield f"{where} file: no such file; got '{history.file}'"
+    yield from _fmu_problems(study.fmu, tuple(study.load_inputs), known)
 
 
 def _fmu_problems(fmu: FmuSettings, inputs: tuple[str, ...], sensors: tuple[str, ...]) -> Iterator[str]:

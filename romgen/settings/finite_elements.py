@@ -142,6 +142,32 @@ class BaseAccelerationSettings(Settings):
     direction: Direction
 
 
+class ExcitationSettings(Settings):
+    """Table [excitations.<name>]: a force in N along ``direction`` at a point or spread over a face, edge or region.
+
+    Without a direction it is a pressure in Pa against the normals of a face.
+    """
+
+    surface: str | None = None
+    point: tuple[Length, Length, Length] | None = None
+    direction: tuple[float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.surface is None) == (self.point is None):
+            raise ValueError("needs either surface or point")
+        if self.point is not None and self.direction is None:
+            raise ValueError("a force at a point needs a direction, such as [0.0, 1.0, 0.0]")
+        if self.direction is not None and not any(self.direction):
+            raise ValueError("direction is zero")
+        return self
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the load input."""
+        return "Pa" if self.direction is None else "N"
+
+
 class RingDownStart(Settings):
     """Table [[ringdowns.training]] or [[ringdowns.validation]]: peak displacement of each master mode, m."""
 

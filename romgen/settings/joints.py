@@ -1,4 +1,4 @@
-"""Tables of a study that join bodies: frictional pairs, bonded surfaces, bolts."""
+"""Tables of a study that join bodies to each other and to the ground: pairs, ties, bolts, springs, beds, masses."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from romgen.settings.base import Force, Length, Penalty, PositiveLength, Settings
+from romgen.settings.base import BedStiffness, Force, Length, Mass, Penalty, PositiveLength, Settings, SpringStiffness
 
 
 class ContactSettings(Settings):
@@ -39,3 +39,26 @@ class BoltSettings(Settings):
     axis: Literal["x", "y", "z"] = "y"
     section: Length | None = None
     stiffness: float = Field(default=1000.0, gt=0.0)
+
+
+class SpringSettings(Settings):
+    """Table [springs.<name>]: k_x, k_y, k_z between a point and the ground, or a second point ``to``."""
+
+    point: tuple[Length, Length, Length]
+    stiffness: tuple[SpringStiffness, SpringStiffness, SpringStiffness]
+    to: tuple[Length, Length, Length] | None = None
+
+
+class FoundationSettings(Settings):
+    """Table [foundations.<name>]: an elastic bed under a face; ``normal`` defaults to 1000 E / h, which holds it."""
+
+    surface: str
+    normal: BedStiffness | None = None
+    tangential: BedStiffness = 0.0
+
+
+class PointMassSettings(Settings):
+    """Table [point_masses.<name>]: a mass that moves with a material point, such as a sensor."""
+
+    point: tuple[Length, Length, Length]
+    mass: Mass

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from romgen.settings.base import Acceleration, PositiveFrequency, PositiveTime, Settings, Time
 
@@ -40,6 +40,34 @@ class ForcedValidationSettings(Settings):
 
     shares: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = Field(default=(0.5, 0.9), min_length=1)
     duration: PositiveTime = 0.3
+
+
+class LoadHistorySettings(Settings):
+    """Table [load_histories.<name>]: a function of time on one load input that both models follow from rest.
+
+    Samples (s, unit of the input) from ``times`` and ``values`` or a CSV ``file`` of two columns, times ``scale``;
+    linear between them, 0 outside.
+    """
+
+    input: str
+    file: Path | None = None
+    times: tuple[Time, ...] = ()
+    values: tuple[float, ...] = ()
+    scale: float = 1.0
+    duration: PositiveTime | None = None
+
+    @field_validator("file")
+    @classmethod
+    def _beside_the_study(cls, file: Path | None, info: ValidationInfo) -> Path | None:
+        return None if file is None else (Path((info.context or {}).get("folder", ".")) / file).resolve()
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.file is None) == (not self.times):
+            raise ValueError("needs either file, or times and values")
+        if len(self.times) != len(self.values):
+            raise ValueError(f"has {len(self.times)} times but {len(self.values)} values")
+        return self
 
 
 class FmuSettings(Settings):

@@ -14,6 +14,8 @@ UNITS: dict[str, dict[str, float]] = {
     "N": {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6},
     "kg/m^3": {"kg/m^3": 1.0, "kg/m3": 1.0, "g/cm^3": 1e3, "g/cm3": 1e3, "t/mm^3": 1e12, "kg/mm^3": 1e9},
+    "N/m": {"N/m": 1.0, "N/mm": 1e3, "kN/m": 1e3, "kN/mm": 1e6},
+    "kg": {"kg": 1.0, "g": 1e-3, "t": 1e3},
     "N/m^3": {"N/m^3": 1.0, "N/mm^3": 1e9, "MPa/mm": 1e9, "GPa/m": 1e9},
 }
 """Accepted units of each SI unit and their factor to it."""

@@ -12,6 +12,7 @@ from romgen.settings.finite_elements import (
     BaseAccelerationSettings,
     BlockSettings,
     ConstraintSettings,
+    ExcitationSettings,
     LoadSettings,
     MaterialSettings,
     ModesSettings,
@@ -19,16 +20,27 @@ from romgen.settings.finite_elements import (
     RingDownSettings,
     SensorSettings,
 )
-from romgen.settings.joints import BoltSettings, ContactSettings, TieSettings
+from romgen.settings.joints import (
+    BoltSettings,
+    ContactSettings,
+    FoundationSettings,
+    PointMassSettings,
+    SpringSettings,
+    TieSettings,
+)
 from romgen.settings.learning import (
     AcceptanceSettings,
     FmuSettings,
     ForcedResponseSettings,
     ForcedValidationSettings,
     LearnSettings,
+    LoadHistorySettings,
     ReportSettings,
 )
 from romgen.settings.mesh_files import MeshSettings, RegionSettings
+
+BASE_ACCELERATION = "base_acceleration"
+"""Name of the load input of table [base_acceleration]."""
 
 
 class StudySettings(Settings):
@@ -49,17 +61,22 @@ class Study(Settings):
     contacts: dict[str, ContactSettings] = Field(default_factory=dict)
     ties: dict[str, TieSettings] = Field(default_factory=dict)
     bolts: dict[str, BoltSettings] = Field(default_factory=dict)
+    springs: dict[str, SpringSettings] = Field(default_factory=dict)
+    foundations: dict[str, FoundationSettings] = Field(default_factory=dict)
+    point_masses: dict[str, PointMassSettings] = Field(default_factory=dict)
     constraints: tuple[ConstraintSettings, ...] = ()
     loads: tuple[LoadSettings, ...] = ()
     preload: PreloadSettings = PreloadSettings()
     modes: ModesSettings = ModesSettings()
     sensors: dict[str, SensorSettings] = Field(default_factory=dict)
     base_acceleration: BaseAccelerationSettings | None = None
+    excitations: dict[str, ExcitationSettings] = Field(default_factory=dict)
     ringdowns: RingDownSettings | None = None
     data: DataSettings | None = None
     learn: LearnSettings = LearnSettings()
     forced_response: ForcedResponseSettings = ForcedResponseSettings()
     forced_validation: ForcedValidationSettings | None = None
+    load_histories: dict[str, LoadHistorySettings] = Field(default_factory=dict)
     fmu: FmuSettings = FmuSettings()
     report: ReportSettings = ReportSettings()
     acceptance: AcceptanceSettings = AcceptanceSettings()
@@ -87,6 +104,12 @@ class Study(Settings):
     def bodies(self) -> dict[str, BlockSettings | MeshSettings]:
         """All bodies, blocks first."""
         return {**self.blocks, **self.meshes}
+
+    @property
+    def load_inputs(self) -> dict[str, str]:
+        """Names of the load inputs and their SI units: the acceleration of the base first."""
+        base = {} if self.base_acceleration is None else {BASE_ACCELERATION: "m/s2"}
+        return base | {name: table.unit for name, table in self.excitations.items()}
 
     @property
     def sensor_names(self) -> tuple[str, ...]:

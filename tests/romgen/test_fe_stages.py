@@ -10,7 +10,7 @@ import pytest
 
 from romgen import fe_stages, fe_transients
 from romgen.errors import InputError, NumericalError
-from romgen.forced_validation import ForcedMotion
+from romgen.forced_motion import ForcedMotion, cosine
 from romgen.settings import Study, load_study
 from romgen.store import read_file, write_file
 from romgen.structure import Modes, Preload
@@ -280,9 +280,8 @@ def test_forced_march_follows_the_linear_steady_state(solved: tuple[Study, Prelo
     drive = omega * np.array([0.3, 1.2])
     level = 1e-6 * omega**2 / abs(load) * np.ones(2) * 1e-2
     X = load * level / (omega**2 - drive**2 + 2j * zeta * omega * drive)
-    motion = ForcedMotion(
-        np.outer(modes.shapes[:, 0], X.real), np.outer(modes.shapes[:, 0], (1j * drive * X).real), level, drive, 40
-    )
+    start = np.outer(modes.shapes[:, 0], X.real), np.outer(modes.shapes[:, 0], (1j * drive * X).real)
+    motion = ForcedMotion(*start, {"base_acceleration": cosine(level, drive)}, 40)
     segments = list(fe_transients.march_forced(study, preload, modes, motion, None))
     t, sensors = fe_transients.join_sensors(segments, study)
     eta = np.concatenate([s.eta for s in segments])[:, 0, :]

@@ -67,7 +67,8 @@ def test_lifted_start_moves_as_the_model_does(model: ReducedModel, points: tuple
         assert motion.displacement[:, case] == pytest.approx(y[0], rel=1e-9)
         # One-sided difference quotients: over 1e-7 s here, order 2 over 1e-4 s there.
         assert motion.velocity[:, case] == pytest.approx(rate, abs=1e-5 * np.abs(rate).max())
-    assert motion.base_acceleration(0.0) == pytest.approx([point.level for point in points])
+    (load,) = motion.loads.values()
+    assert load(0.0) == pytest.approx([point.level for point in points])
     assert motion.n_step == 7
 
 

@@ -91,7 +91,8 @@ def test_second_run_recomputes_nothing(finished: RunResult, lab_study: Path) -> 
 
 
 def test_tables_reach_exactly_the_stages_that_use_them() -> None:
-    study = Study.model_validate({**STUDY, "forced_validation": {}})
+    pulse = {"input": "base_acceleration", "times": (0.0, 1.0), "values": (0.0, 1.0)}
+    study = Study.model_validate({**STUDY, "forced_validation": {}, "load_histories": {"pulse": pulse}})
     stages = {stage.name: stage for stage in stages_of(study)}
     used = {table.split(".")[0] for name, stage in stages.items() if name != "provenance" for table in stage.tables}
     # the report states what [report] and [acceptance] say, through the provenance of the whole study

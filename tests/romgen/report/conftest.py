@@ -11,11 +11,12 @@ from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.backbone import backbone
 from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.forced_response import forced_response
+from romgen.load_histories import HistoryComparison, compare_history
 from romgen.polynomial import PolynomialMap
 from romgen.provenance import collect_provenance
 from romgen.reduced_model import ReducedModel
 from romgen.report import OrderTrial, Reconstruction, ReportInputs, StageCost
-from romgen.settings import ForcedResponseSettings
+from romgen.settings import ForcedResponseSettings, LoadHistorySettings
 from romgen.structure import EnergyLedger, FrequencyRatio, Interface, Modes, Preload, RingDown, StepEffort, Structure
 from romgen.trajectory import Trajectory
 
@@ -178,6 +179,14 @@ def stages() -> tuple[StageCost, ...]:
     )
 
 
+def _history(model: ReducedModel) -> HistoryComparison:
+    """A pulse on the base that both models follow, the second 3 % less far."""
+    pulse = LoadHistorySettings(input=model.inputs[0], times=(0.0, 2e-3, 4e-3), values=(0.0, 1.0, 0.0), duration=0.02)
+    t = np.linspace(0.0, 0.02, 401)
+    own = compare_history(model, "pulse", pulse, t, np.ones((401, len(model.sensors)))).rom
+    return compare_history(model, "pulse", pulse, t, 0.97 * own)
+
+
 @pytest.fixture(scope="session")
 def full_inputs(
     structure: Structure,
@@ -203,6 +212,7 @@ def full_inputs(
         coefficient_deviation=0.01 * np.abs(model.normal_form.coefficients),
         orders=(OrderTrial(3, 6.0, False), OrderTrial(5, 2.9, True)),
         forced=forced_response(model, ForcedResponseSettings(levels=(1.0, 2.0), sensor="mid")),
+        histories=(_history(model),),
         backbones=(backbone(model, 0), backbone(model, 0, slaved=True), backbone(model, 1)),
         fmu_export=FmuExport("clamped_arch.fmu", 181_204, "ab" * 32, "{1234}", ("linux64", "win64"), "zig 0.13", ()),
         fmu_check=FmuCheck((), 3.1e-12, 1e-12, 2e-12, 3.1e-12, (), 4e-10, 1e-4, 2000),

@@ -110,6 +110,7 @@ ABSENT = {
     "energy": {"ring_downs": ()},
     "model": {"model": None},
     "forced": {"forced": None},
+    "histories": {"histories": ()},
     "backbone": {"backbones": ()},
     "fmu": {"fmu_export": None, "fmu_check": None, "fmu_replays": {}},
     "cost": {"stages": ()},
