@@ -33,8 +33,9 @@ from romgen.errors import NumericalError
 from romgen.polynomial import zeta
 
 MAX_STEPS = 60
-# Relative decrease of the cost below which Levenberg-Marquardt has converged.
-DECREASE = 1e-5
+# Relative decrease of the cost below which Levenberg-Marquardt has converged, or has settled: what is left then lies in
+# directions that the samples hardly determine, and in many unknowns takes more time than all steps before.
+DECREASE, SETTLED = 1e-5, 1e-3
 MAX_REJECTIONS = 25
 
 
@@ -86,7 +87,7 @@ def fit_conjugacy(
     start: tuple[ComplexArray, ComplexArray],
     ridge: float | FloatArray,
 ) -> ConjugacyFit:
-    """Minimise the conjugacy cost by Levenberg-Marquardt with the exact Jacobian.
+    """Minimise the conjugacy cost by Levenberg-Marquardt with the exact Jacobian, to convergence.
 
     Parameters
     ----------
@@ -100,7 +101,25 @@ def fit_conjugacy(
     ------
     NumericalError : the cost is not finite at the start.
     """
-    problem = ConjugacyProblem(samples[0], samples[1], eigenvalues, exponents, resonant)
+    return _fit(ConjugacyProblem(*samples, eigenvalues, exponents, resonant), start, ridge, DECREASE)
+
+
+def settle_conjugacy(
+    samples: tuple[ComplexArray, ComplexArray],
+    eigenvalues: ComplexArray,
+    exponents: IntArray,
+    resonant: BoolArray,
+    start: tuple[ComplexArray, ComplexArray],
+    ridge: float | FloatArray,
+) -> ConjugacyFit:
+    """Minimise as ``fit_conjugacy`` until a step lowers the cost by less than a thousandth."""
+    return _fit(ConjugacyProblem(*samples, eigenvalues, exponents, resonant), start, ridge, SETTLED)
+
+
+def _fit(
+    problem: ConjugacyProblem, start: tuple[ComplexArray, ComplexArray], ridge: float | FloatArray, decrease: float
+) -> ConjugacyFit:
+    resonant = problem.resonant
     theta = np.where(resonant, start[1], start[0]).astype(np.complex128)
     here, rows = linearise(problem, theta)
     weight = ridge * rows.diagonal
@@ -115,14 +134,14 @@ def fit_conjugacy(
         theta, total, damping = found
         here, rows = linearise(problem, theta)
         costs.append(total)
-        if costs[-2] - costs[-1] <= DECREASE * costs[-2]:
+        if costs[-2] - costs[-1] <= decrease * costs[-2]:
             break
     cost = _cost(here.r)
     deviation = _deviations(rows, weight, cost / problem.samples)
     zero = np.zeros_like(theta)
     A, B = np.where(resonant, zero, theta), np.where(resonant, theta, zero)
     spread = np.where(resonant, 0.0, deviation), np.where(resonant, deviation, 0.0)
-    return ConjugacyFit(exponents, A, B, cost, np.array(costs), *spread)
+    return ConjugacyFit(problem.exponents, A, B, cost, np.array(costs), *spread)
 
 
 def _cost(r: ComplexArray) -> float:
