@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from romgen.backbone import Backbone, backbone
+from romgen.confidence_band import ConfidenceBand, confidence_band
 from romgen.errors import InputError
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_response import forced_response
@@ -24,9 +25,11 @@ class Backbones:
     Attributes
     ----------
     curves : each mode with the others at zero, then those that the others can lock to.
+    bands : confidence limits of each curve, () where the coefficients have no replicates.
     """
 
     curves: tuple[Backbone, ...]
+    bands: tuple[ConfidenceBand, ...] = ()
 
 
 def forced_stages(study: Study) -> tuple[Stage, ...]:
@@ -102,12 +105,13 @@ def march_histories(context: Context) -> LoadHistories:
 
 
 def compute_backbones(context: Context) -> Backbones:
-    """Follow the backbone of every master mode."""
-    model = learned_model(context)
+    """Follow the backbone of every master mode, and its confidence limits."""
+    model, replicates = learned_model(context), learned(context).fit.replicates
     modes = range(len(model.eigenvalues))
     curves = [backbone(model, mode) for mode in modes]
     r = model.internal_resonance
     # The others lock only to a mode whose integer divides all others: in 1:2 to the first mode, not to the second.
     locking = [mode for mode in modes if r and all(other % r[mode] == 0 for other in r)]
     curves += [backbone(model, mode, slaved=True) for mode in locking]
-    return Backbones(tuple(curves))
+    bands = () if replicates is None else tuple(confidence_band(model, curve, replicates) for curve in curves)
+    return Backbones(tuple(curves), bands)

@@ -12,7 +12,7 @@ from romgen.chart import ReducedTrajectory, SensorChart, modal_chart, sensor_cha
 from romgen.errors import InputError
 from romgen.learning_notes import choice_sentence, learning_notes
 from romgen.manifold import Manifold, ManifoldFit
-from romgen.normal_form import NormalFormFit, fit_normal_form
+from romgen.normal_form import NormalFormFit, fit_normal_form, with_replicates
 from romgen.order_selection import OrderTable, choose_order
 from romgen.polynomial import PolynomialMap, exponents
 from romgen.reduced_dynamics import LinearPart
@@ -124,9 +124,10 @@ def learn(
 def best_fit(
     training: Sequence[ReducedTrajectory], table: OrderTable, settings: LearnSettings, known: LinearPart | None = None
 ) -> NormalFormFit:
-    """Return the normal form of all training data by the order and method of the table."""
+    """Return the normal form of all training data by the order and method of the table, with its replicates."""
     method = fit_normal_form if table.method == "conjugacy" else fit_on_trajectories
-    return method(training, table.order, settings.internal_resonance, settings.ridge, known)
+    fit = method(training, table.order, settings.internal_resonance, settings.ridge, known)
+    return with_replicates(fit, training, settings.ridge, keep_linear=known is not None)
 
 
 def reduced_trajectory(trajectory: Trajectory, chart: SensorChart | None, settings: LearnSettings) -> ReducedTrajectory:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory
-from romgen.conjugacy import ConjugacyFit, fit_conjugacy, homological_start
+from romgen.conjugacy import ConjugacyFit, homological_start, settle_conjugacy
 from romgen.errors import NumericalError
+from romgen.jackknife import Replicates, conjugacy_replicates
 from romgen.polynomial import PolynomialMap, evaluate, exponents, monomials, zeta
 from romgen.reduced_dynamics import LinearPart, ReducedDynamics, fit_reduced_dynamics, modal_samples
 from romgen.regression import ridge_fit
@@ -40,6 +41,7 @@ class NormalFormFit:
     inverse_chart : H, (m, n_term) over w.
     amplitude : (m,) largest abs(z_j) of the training motions.
     chart_error_percent : mean over samples of abs(w - Re(T zeta^E)) over the largest abs(w).
+    replicates : coefficients without a block of the data each; None where they were not asked for.
     """
 
     dynamics: ReducedDynamics
@@ -50,6 +52,7 @@ class NormalFormFit:
     inverse_chart: PolynomialMap[np.complex128]
     amplitude: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
     chart_error_percent: float
+    replicates: Replicates | None = None
 
 
 def fit_normal_form(
@@ -77,7 +80,7 @@ def fit_normal_form(
     samples = [modal_samples(dynamics, trajectory) for trajectory in training]
     q, q_dot = np.vstack([s[0] for s in samples]), np.vstack([s[1] for s in samples])
     table = resonance_table(dynamics.eigenvalues, order, internal_resonance)
-    stride = max(1, len(q) // FIT_SAMPLES)
+    stride = _stride(len(q))
     conjugacy = grow_conjugacy(dynamics, (q[::stride], q_dot[::stride]), table, ridge)
     z = q + monomials(zeta(q), table.exponents) @ conjugacy.A.T
     chart = fit_chart(dynamics, q, z, table.exponents, ridge)
@@ -92,6 +95,26 @@ def fit_normal_form(
         np.abs(z).max(axis=0),
         relative_error_percent(w, evaluate(chart, zeta(z)).real),
     )
+
+
+def with_replicates(
+    fit: NormalFormFit, training: Sequence[ReducedTrajectory], ridge: float, *, keep_linear: bool = False
+) -> NormalFormFit:
+    """Return a fit with the replicates of its coefficients; one that has them, or was not fitted here, as it is.
+
+    ``keep_linear`` says that the linear part was given and not fitted.
+    """
+    if fit.conjugacy is None or fit.replicates is not None:
+        return fit
+    ridges = ridge, graded_ridge(ridge, fit.resonance.exponents)
+    stride = _stride(sum(len(r.t) for r in training))
+    pair = fit.conjugacy, fit.resonance.resonant
+    options = stride, keep_linear
+    return replace(fit, replicates=conjugacy_replicates(training, fit.dynamics, pair, ridges, options))
+
+
+def _stride(n_sample: int) -> int:
+    return max(1, n_sample // FIT_SAMPLES)
 
 
 def resonance_table(eigenvalues: ComplexArray, order: int, internal_resonance: Resonance) -> ResonanceTable:
@@ -124,7 +147,7 @@ def grow_conjugacy(
         else:
             more = ((0, 0), (0, n_term - fit.A.shape[1]))
             start = np.pad(fit.A, more), np.pad(fit.B, more)
-        fit = fit_conjugacy(samples, dynamics.eigenvalues, E, resonant, start, graded_ridge(ridge, E))
+        fit = settle_conjugacy(samples, dynamics.eigenvalues, E, resonant, start, graded_ridge(ridge, E))
     if fit is None:
         raise NumericalError("the order leaves no nonlinear term", where="normal form", value=int(degree.max()))
     return fit

@@ -136,6 +136,31 @@ def _step(here: _Linearised, damping: float) -> FloatArray:
     return change
 
 
+def replicates(
+    model: RefinedDynamics, segments: Sequence[Segment], max_step: float, references: ComplexArray
+) -> list[RefinedDynamics]:
+    """Return the models of one Gauss-Newton step from the optimum with one block of samples left out each.
+
+    Parameters
+    ----------
+    references : (n_segment * n_block, m) eigenvalues of the prior without each block; blocks are equal stretches of
+        time of a segment.
+    """
+    blocks = len(references) // len(segments)
+    segments = tuple(segments)
+    motion = _sensitivities(model, segments, max_step)
+    models = []
+    for number, segment in enumerate(segments):
+        of = np.arange(len(segment.t)) * blocks // len(segment.t)
+        for block in range(blocks):
+            fewer = replace(segment, kept=segment.kept & (of != block))
+            kept = (*segments[:number], fewer, *segments[number + 1 :])
+            tied = replace(model, reference=references[number * blocks + block])
+            here = _normal_equations(tied, kept, motion)
+            models.append(_moved(model, kept, _step(here, 0.0))[0])
+    return models
+
+
 def regrown(model: RefinedDynamics, table: ResonanceTable) -> RefinedDynamics:
     """Return the model over the terms of a longer table, whose first rows are the old ones; new coefficients are 0."""
     more = ((0, 0), (0, len(table.exponents) - len(model.exponents)))
@@ -221,7 +246,14 @@ def _cost(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float
 
 def _linearise(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float) -> _Linearised:
     """Simulate all segments with sensitivities, eliminate C, and return cost, gradient and Gauss-Newton Hessian."""
-    z, S = _sensitivities(model, segments, max_step)
+    return _normal_equations(model, segments, _sensitivities(model, segments, max_step))
+
+
+def _normal_equations(
+    model: RefinedDynamics, segments: tuple[Segment, ...], motion: tuple[ComplexArray, ComplexArray]
+) -> _Linearised:
+    """Return cost, gradient and Hessian for z and its sensitivities."""
+    z, S = motion
     rows, share, norm = _projected(model, z, segments)
     C, rest = np.array([row.C for row in rows]), np.array([row.rest for row in rows]).T
     s = slopes(model.output, C, z)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TypeVar
 
+from romgen.arrays import FloatArray
 from romgen.fmu.check import SEED
 from romgen.fmu_stages import Exported, Validation
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
+from romgen.jackknife import jackknife_deviation
 from romgen.learn import Learned
 from romgen.learning_stages import learned
 from romgen.load_histories import LoadHistories
@@ -67,12 +69,13 @@ def report_inputs(context: Context) -> ReportInputs:
         model=record.model,
         polar_form=polar_text(record.model),
         resonance_reason=record.fit.resonance.reason,
-        coefficient_deviation=None if record.fit.conjugacy is None else record.fit.conjugacy.B_deviation,
+        coefficient_deviation=_deviation(record),
         orders=_orders(record),
         forced=_optional(context, "forced_response", ForcedResponse),
         forced_points=() if forced is None else forced.points,
         histories=() if histories is None else histories.histories,
         backbones=() if backbones is None else backbones.curves,
+        bands=() if backbones is None else backbones.bands,
         sensor=study.forced_response.sensor,
         measure=study.forced_response.measure,
         fmu_export=None if exported is None else exported.native,
@@ -87,6 +90,12 @@ def report_inputs(context: Context) -> ReportInputs:
         vtu=study.report.vtu,
         limits=study.acceptance,
     )
+
+
+def _deviation(record: Learned) -> FloatArray | None:
+    """The jackknife deviation of each normal-form coefficient."""
+    replicates = record.fit.replicates
+    return None if replicates is None else jackknife_deviation(replicates.normal_form)
 
 
 def _orders(record: Learned) -> tuple[OrderTrial, ...]:

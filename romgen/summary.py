@@ -154,17 +154,25 @@ def _load_histories(context: Context) -> list[dict[str, Any]]:
 
 
 def _backbone(context: Context) -> dict[str, Any]:
-    curve, forced = context.record("backbone", Backbones).curves[0], context.study.forced_response
+    record, forced = context.record("backbone", Backbones), context.study.forced_response
+    curve = record.curves[0]
     sensor = curve.sensors.index(forced.sensor) if forced.sensor else 0
     amplitude = curve.amplitude_max if forced.measure == "max" else curve.amplitude_sqrt2_rms
     step = max(1, len(curve.rho) // BACKBONE_POINTS)
-    return {
+    part: dict[str, Any] = {
         "sensor": curve.sensors[sensor],
         "measure": forced.measure,
         "frequency_hz": curve.frequency_hz[::step],
         "amplitude_m": amplitude[::step, sensor],
         "damping_ratio": curve.damping_ratio[::step],
     }
+    for band in record.bands[:1]:
+        part |= {
+            "confidence_level": band.level,
+            "frequency_limits_hz": band.frequency_hz[::step],
+            "damping_ratio_limits": band.damping_ratio[::step],
+        }
+    return part
 
 
 def _export(context: Context) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,13 +11,14 @@ import numpy as np
 from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import DROPPED, first_derivative, is_uniform
+from romgen.jackknife import Replicates, blocks_of
 from romgen.metrics import analytic_signal
 from romgen.normal_form import NormalFormFit, Resonance, resonance_table
 from romgen.output_map import output_map
 from romgen.polynomial import monomials, zeta
 from romgen.reduced_dynamics import LinearPart, ReducedDynamics, fit_reduced_dynamics, modal_samples
 from romgen.refined_chart import refined_normal_form
-from romgen.refinement import RefinedDynamics, Segment, refine, regrown
+from romgen.refinement import RefinedDynamics, Segment, refine, regrown, replicates
 from romgen.regression import ridge_fit
 from romgen.resonance import ResonanceTable
 
@@ -55,7 +56,7 @@ def fit_on_trajectories(
     ridge: float,
     known: LinearPart | None = None,
 ) -> NormalFormFit:
-    """Return the last of ``growing_fits`` up to ``order``, every sample counted.
+    """Return the last of ``growing_fits`` up to ``order``, every sample counted, with its replicates.
 
     Parameters
     ----------
@@ -69,7 +70,12 @@ def fit_on_trajectories(
     NumericalError : the linear part does not decay.
     """
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
-    return list(growing_fits(training, everything, growing_orders(order), (internal_resonance, ridge, known)))[-1]
+    last = list(_grown(training, everything, growing_orders(order), (internal_resonance, ridge, known)))[-1]
+    table = resonance_table(last.dynamics.eigenvalues, min(order, START_ORDER), internal_resonance)
+    references = _references(training, last.dynamics, table, keep_linear=known is not None)
+    others = replicates(last.model, last.segments, last.max_step, references)
+    spread = Replicates(np.array([o.eigenvalues for o in others]), np.array([o.B for o in others]))
+    return replace(last.normal_form(ridge), replicates=spread)
 
 
 def growing_orders(order: int) -> list[int]:
@@ -99,6 +105,30 @@ def growing_fits(
     ------
     The normal form of each order.
     """
+    for state in _grown(training, kept, orders, settings):
+        yield state.normal_form(settings[1])
+
+
+@dataclass(frozen=True)
+class _Refined:
+    """What refinement has reached at one order."""
+
+    dynamics: ReducedDynamics
+    model: RefinedDynamics
+    table: ResonanceTable
+    segments: tuple[Segment, ...]
+    max_step: float
+
+    def normal_form(self, ridge: float) -> NormalFormFit:
+        return refined_normal_form(self.dynamics, self.model, self.table, self.segments, (ridge, self.max_step))
+
+
+def _grown(
+    training: Sequence[ReducedTrajectory],
+    kept: Sequence[BoolArray],
+    orders: Sequence[int],
+    settings: tuple[Resonance, float, LinearPart | None],
+) -> Iterator[_Refined]:
     internal_resonance, ridge, known = settings
     seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
     dynamics = fit_reduced_dynamics(seen, min(orders[0], START_ORDER), ridge, known)
@@ -117,7 +147,7 @@ def growing_fits(
             model = shooting
             whole = tuple(replace(s, z0=shots[k].z0) for s, k in zip(whole, first, strict=True))
         model, whole = refine(regrown(model, table), whole, max_step, STEPS, DECREASE)
-        yield refined_normal_form(dynamics, model, table, whole, (ridge, max_step))
+        yield _Refined(dynamics, model, table, whole, max_step)
 
 
 def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:
@@ -203,6 +233,17 @@ def _rates(
             row = ridge_fit(np.hstack([own, terms]), rate_j, 0.0)[0]
             eigenvalues[j], B[j, kept] = row[0], row[1:]
     return eigenvalues, B
+
+
+def _references(
+    training: Sequence[ReducedTrajectory], dynamics: ReducedDynamics, table: ResonanceTable, *, keep_linear: bool
+) -> ComplexArray:
+    """Return the eigenvalues of the start without each block, (n_block, m): they come from the same data."""
+    signals, block = [_signals(dynamics, r) for r in training], blocks_of(training)
+    ends = np.cumsum([len(r.t) for r in training])[:-1]
+    kept = [np.split(block != b, ends) for b in range(block.max() + 1)]
+    rates = (_rates(dynamics, training, (signals, masks), table, keep_linear=keep_linear) for masks in kept)
+    return np.array([eigenvalues for eigenvalues, _ in rates])
 
 
 def _segments(

@@ -10,6 +10,7 @@ import numpy as np
 
 from romgen.arrays import FloatArray
 from romgen.backbone import Backbone
+from romgen.confidence_band import ConfidenceBand
 from romgen.fmu.records import FmuCheck, FmuExport, FmuLevels
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_validation import ForcedPoint
@@ -84,7 +85,7 @@ class ReportInputs:
     forced : frequency response at all levels.
     forced_points : points of it that the finite-element model computed too.
     histories : load histories that both models followed.
-    backbones : free vibration of the reduced model, one per mode and kind.
+    backbones : free vibration of the reduced model, one per mode and kind; bands : confidence limits of each, or ().
     sensor, measure : where and how amplitudes are observed; None takes the sensor that sees most.
     fmu_export, pythonfmu_export, fmu_check : the exported units and how well they repeat the Python model.
     fmu_levels : validation levels L0 to L3 of the native unit; fmi3_export : the FMI 3.0 unit.
@@ -113,6 +114,7 @@ class ReportInputs:
     forced_points: tuple[ForcedPoint, ...] = ()
     histories: tuple[HistoryComparison, ...] = ()
     backbones: tuple[Backbone, ...] = ()
+    bands: tuple[ConfidenceBand, ...] = ()
     sensor: str | None = None
     measure: Measure = "sqrt2_rms"
     fmu_export: FmuExport | None = None

@@ -146,7 +146,7 @@ def backbone_section(inputs: ReportInputs) -> Section | None:
     """Free vibration of the reduced model."""
     if not inputs.backbones:
         return None
-    figure = backbone_figure(inputs.backbones, inputs.sensor, inputs.measure)
+    figure = backbone_figure(inputs.backbones, inputs.sensor, inputs.measure, inputs.bands)
     notes = tuple(TextBlock(f"{backbone_name(curve)}: {note}.") for curve in inputs.backbones for note in curve.notes)
     return Section("backbone", "Backbone and damping", (figure, *notes))
 

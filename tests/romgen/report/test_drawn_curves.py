@@ -7,6 +7,8 @@ import pytest
 from matplotlib.axes import Axes
 
 from romgen.arrays import FloatArray
+from romgen.confidence_band import confidence_band
+from romgen.jackknife import Replicates
 from romgen.report import ReportInputs
 from romgen.report.backbone_figures import backbone_figure
 from romgen.report.forced_figures import modal_figure, response_figure
@@ -70,6 +72,29 @@ def test_backbone(full_inputs: ReportInputs) -> None:
     second = tables["backbone_mode2_alone"]
     assert drawn(block.figure.axes[2], 1e3 * second["amplitude"], second["frequency"])
     assert drawn(block.figure.axes[3], 1e3 * second["amplitude"], 100.0 * second["damping ratio"])
+
+
+def test_confidence_limits_are_drawn_and_written(full_inputs: ReportInputs) -> None:
+    """One eigenvalue per replicate, 1 % apart: the deviation of the frequency is that of its eigenvalue."""
+    model = full_inputs.model
+    assert model is not None
+    shares = np.array([0.99, 1.0, 1.01])
+    nonlinear = np.repeat(model.normal_form.coefficients[None], 3, axis=0)
+    replicates = Replicates(shares[:, None] * model.eigenvalues, nonlinear)
+    curve = full_inputs.backbones[0]
+    band = confidence_band(model, curve, replicates)
+    with house_style():
+        block = backbone_figure((curve,), None, "max", (band,))
+    (table,) = block.tables
+    half = table["frequency upper limit"] - table["frequency"]
+    # jackknife: 2/3 (0.01^2 + 0.01^2) omega^2; two degrees of freedom: t = 4.3027
+    expected = 4.302653 * np.sqrt(2.0 / 3.0 * 2e-4) * model.eigenvalues[0].imag / (2.0 * np.pi)
+    np.testing.assert_allclose(half, expected, rtol=1e-6)
+    np.testing.assert_allclose(table["frequency"] - table["frequency lower limit"], half, rtol=1e-6)
+    path = block.figure.axes[0].collections[0].get_paths()[0].vertices
+    assert path[:, 1].max() == pytest.approx(float(table["frequency upper limit"].max()))
+    damping = block.figure.axes[1].collections[0].get_paths()[0].vertices
+    assert damping[:, 1].max() == pytest.approx(100.0 * float(table["damping ratio upper limit"].max()))
 
 
 def test_energy_stack_reaches_the_budget(full_inputs: ReportInputs) -> None:
