@@ -21,6 +21,8 @@ from romgen.substitution import substitute_linear
 
 # Rows used by the conjugacy fit: a few thousand phases and amplitudes determine all coefficients.
 FIT_SAMPLES = 4000
+# Rows used by the regression of the chart, whose error is then measured on all.
+CHART_SAMPLES = 12_000
 # Terms above degree 3 take a ridge 10^degree times stronger: few motions leave them free between their amplitudes.
 FREE_DEGREE, GRADE = 3, 10.0
 
@@ -80,10 +82,10 @@ def fit_normal_form(
     samples = [modal_samples(dynamics, trajectory) for trajectory in training]
     q, q_dot = np.vstack([s[0] for s in samples]), np.vstack([s[1] for s in samples])
     table = resonance_table(dynamics.eigenvalues, order, internal_resonance)
-    stride = _stride(len(q))
+    stride, step = _stride(len(q), FIT_SAMPLES), _stride(len(q), CHART_SAMPLES)
     conjugacy = grow_conjugacy(dynamics, (q[::stride], q_dot[::stride]), table, ridge)
     z = q + monomials(zeta(q), table.exponents) @ conjugacy.A.T
-    chart = fit_chart(dynamics, q, z, table.exponents, ridge)
+    chart = fit_chart(dynamics, q[::step], z[::step], table.exponents, ridge)
     w = 2.0 * (q @ dynamics.vectors.T).real
     return NormalFormFit(
         dynamics,
@@ -107,14 +109,14 @@ def with_replicates(
     if fit.conjugacy is None or fit.replicates is not None:
         return fit
     ridges = ridge, graded_ridge(ridge, fit.resonance.exponents)
-    stride = _stride(sum(len(r.t) for r in training))
+    stride = _stride(sum(len(r.t) for r in training), FIT_SAMPLES)
     pair = fit.conjugacy, fit.resonance.resonant
     options = stride, keep_linear
     return replace(fit, replicates=conjugacy_replicates(training, fit.dynamics, pair, ridges, options))
 
 
-def _stride(n_sample: int) -> int:
-    return max(1, n_sample // FIT_SAMPLES)
+def _stride(n_sample: int, wanted: int) -> int:
+    return max(1, n_sample // wanted)
 
 
 def resonance_table(eigenvalues: ComplexArray, order: int, internal_resonance: Resonance) -> ResonanceTable:

@@ -17,6 +17,7 @@ from romgen.confidence_band import ConfidenceBand, confidence_band
 from romgen.jackknife import blocks_of, effective_blocks, jackknife_deviation
 from romgen.normal_form import NormalFormFit, fit_normal_form, with_replicates
 from romgen.order_selection import autonomous_model
+from romgen.reduced_dynamics import LinearPart
 from romgen.simulate import simulate
 from romgen.trajectory_fit import fit_on_trajectories, masked
 from tests.normal_form_models import damped_oscillator
@@ -118,6 +119,18 @@ def test_replicates_of_a_direct_fit_are_refits() -> None:
             (fit.replicates.normal_form[block][kept], again, fit.replicates.normal_form[:, kept]),
         ):
             assert abs(ours - new) < 0.2 * jackknife_deviation(all_of_them)
+
+
+def test_a_given_linear_part_has_no_spread() -> None:
+    known = LinearPart(np.array([1.0]), np.array([0.5 * DAMPING]))
+    training = with_noise(decays(), np.random.default_rng(4), 2e-3)
+    kept = with_replicates(fit_normal_form(training, 3, (), RIDGE, known), training, RIDGE, keep_linear=True)
+    for fit in (kept, fit_on_trajectories(training, 3, (), RIDGE, known)):
+        assert fit.replicates is not None
+        np.testing.assert_array_equal(fit.replicates.eigenvalues, np.tile(fit.dynamics.eigenvalues, (24, 1)))
+        spread = jackknife_deviation(fit.replicates.normal_form)
+        assert np.all(spread[fit.resonance.resonant] > 0.0)
+        assert not spread[~fit.resonance.resonant].any()
 
 
 def test_limits_of_a_direct_fit_cover_the_truth_as_often_as_they_say() -> None:
