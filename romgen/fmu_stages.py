@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from romgen.arrays import FloatArray
@@ -159,10 +159,21 @@ def _validate(context: Context, unit: Path) -> Validation:
     replays = tuple(_replay(context, item, unit) for item in motions)
     context.report(0.8, "levels L0 to L3")
     levels = validate_unit(unit)
+    if context.study.fmu.fmi3:
+        context.report(0.9, "levels L0 to L3, FMI 3.0")
+        levels = with_fmi3(levels, validate_unit(_path(context, "_fmi3")))
     for row in levels.rows:
         if not row.passed:
             log.warning("FMU, %s: %s: %.3g, limit %g +- %g", row.level, row.check, row.value, row.target, row.limit)
     return Validation(check, replays, levels)
+
+
+def with_fmi3(levels: FmuLevels, more: FmuLevels) -> FmuLevels:
+    """The levels of a unit of FMI 2.0 followed by those of its FMI 3.0 twin, whose names say so."""
+    rows = tuple(replace(row, level=f"{row.level} FMI 3.0") for row in more.rows)
+    problems = tuple(f"FMI 3.0: {problem}" for problem in more.problems)
+    notes = tuple(f"FMI 3.0: {note}" for note in more.notes if note not in levels.notes)
+    return FmuLevels((*levels.rows, *rows), (*levels.problems, *problems), (*levels.notes, *notes))
 
 
 def _replay(context: Context, motion: TrajectoryError, unit: Path) -> Replay:

@@ -108,7 +108,8 @@ class LevelRow:
 
     Attributes
     ----------
-    level : "L0" structure and binary, "L1" kernel and trajectory, "L2" state and use, "L3" importers and inputs.
+    level : "L0" structure and binary, "L1" kernel and trajectory, "L2" state and use, "L3" importers and inputs;
+        in a study "L0 FMI 3.0" and so on for the second unit.
     check : what was compared with what.
     value, target, limit : the figure, what it should be, and how far it may be off.
     """

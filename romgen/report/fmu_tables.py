@@ -42,12 +42,12 @@ def check_table(check: FmuCheck, limit: float) -> TableBlock:
 
 
 def levels_table(levels: FmuLevels) -> TableBlock:
-    """The validation levels of the native unit, each check against its limit."""
+    """The validation levels of the native units, each check against its limit."""
     rows = tuple(
         (r.level, r.check, f"{r.value:.3g}", f"{r.target:g} ± {r.limit:g}", "met" if r.passed else "not met")
         for r in levels.rows
     )
-    caption = "Validation levels of the native unit, as romgen validate prints them. " + " ".join(
+    caption = "Validation levels of the native units, as romgen validate prints them. " + " ".join(
         f"{note}." for note in levels.notes
     )
     return TableBlock(caption, ("level", "check", "value", "limit", "verdict"), rows, True)

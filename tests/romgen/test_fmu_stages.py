@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from romgen.fmu_stages import _input_range, _part
+from romgen.fmu.records import FmuLevels, LevelRow
+from romgen.fmu_stages import _input_range, _part, with_fmi3
 from romgen.settings import Study
 from romgen.stage import table_content
 
@@ -52,3 +53,11 @@ def test_progress_of_two_exports_is_one_bar() -> None:
         told(0.0, "")
         told(1.0, "")
     assert seen == [0.0, 0.5, 0.5, 1.0]
+
+
+def test_the_second_unit_is_judged_with_the_first() -> None:
+    good, bad = LevelRow("L0", "a", 0.0, 0.0, 0.0), LevelRow("L1", "b", 1.0, 0.0, 0.1)
+    two, three = FmuLevels((good,), (), ("n",)), FmuLevels((bad,), ("p",), ("n", "m"))
+    both = with_fmi3(two, three)
+    assert [(row.level, row.passed) for row in both.rows] == [("L0", True), ("L1 FMI 3.0", False)]
+    assert (both.problems, both.notes, both.passed) == (("FMI 3.0: p",), ("n", "FMI 3.0: m"), False)

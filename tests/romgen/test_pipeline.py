@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from romgen.fmu_stages import Validation
 from romgen.pipeline import reduced_model, run, stages_of
 from romgen.runner import RunResult
 from romgen.settings import Study, load_study
@@ -49,7 +50,9 @@ def has(content: dict[str, Any], key: str) -> bool:
 
 @pytest.fixture(scope="module")
 def lab_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_lab_study(tmp_path_factory.mktemp("lab"))
+    path = write_lab_study(tmp_path_factory.mktemp("lab"))
+    path.write_text(path.read_text() + "[fmu]\nfmi3 = true\n")
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -77,10 +80,18 @@ def test_model_finds_the_dynamics_behind_the_data(finished: RunResult) -> None:
 
 
 def test_everything_is_left_behind(finished: RunResult) -> None:
-    for name in ("result.h5", "lab.fmu", "lab_pythonfmu.fmu", "summary.json", "report.html", "run.log"):
+    units = ("lab.fmu", "lab_fmi3.fmu", "lab_pythonfmu.fmu")
+    for name in (*units, "result.h5", "summary.json", "report.html", "run.log"):
         assert (finished.run_dir / name).stat().st_size > 0
     assert list(finished.run_dir.glob("csv/*.csv"))
     assert not list(finished.run_dir.glob("segments/*/*"))
+
+
+def test_units_of_both_versions_are_validated(finished: RunResult) -> None:
+    levels = finished.context.record("validation", Validation).levels
+    assert [row.check for row in levels.rows if not row.passed and "GNU" not in row.check] == []
+    assert {row.level for row in levels.rows} >= {"L1", "L2", "L1 FMI 3.0", "L2 FMI 3.0"}
+    assert "L2 FMI 3.0" in (finished.run_dir / "report.html").read_text(encoding="utf-8")
 
 
 def test_second_run_recomputes_nothing(finished: RunResult, lab_study: Path) -> None:
