@@ -193,9 +193,8 @@ def _special(root: Element) -> Iterator[str]:
     exchanged = root.find("ModelExchange") is not None
     states = {value_of(v).get("derivative") for v in root.iter("ScalarVariable")}
     for k, v in enumerate(root.iter("ScalarVariable"), 1):
-        if v.get("canHandleMultipleSetPerTimeInstant") is not None and not (
-            exchanged and v.get("causality") == "input"
-        ):
+        repeated_sets = v.get("canHandleMultipleSetPerTimeInstant") == "true"
+        if repeated_sets and not (exchanged and v.get("causality") == "input"):
             yield f"'{v.get('name')}': canHandleMultipleSetPerTimeInstant is for inputs in Model Exchange"
         if value_of(v).get("reinit") is not None and not (exchanged and str(k) in states):
             yield f"'{v.get('name')}': reinit is for states in Model Exchange"

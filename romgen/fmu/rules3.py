@@ -92,7 +92,8 @@ def variable_rules(root: Element) -> Iterator[str]:
         yield from (f"'{v.get('name')}': {problem}" for problem in (*_kind(v), *_start(v), *_shape(v)))
         if v.get("reinit") is not None and not (exchanged and v.get("valueReference") in states):
             yield f"'{v.get('name')}': reinit is for states in Model Exchange"
-        if v.get("canHandleMultipleSetPerTimeInstant") and not (exchanged and v.get("causality") == "input"):
+        repeated_sets = v.get("canHandleMultipleSetPerTimeInstant") == "true"
+        if repeated_sets and not (exchanged and v.get("causality") == "input"):
             yield f"'{v.get('name')}': canHandleMultipleSetPerTimeInstant is for inputs in Model Exchange"
 
 
