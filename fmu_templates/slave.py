@@ -80,7 +80,7 @@ class RomgenSlave(Fmi2Slave):
         self.eigenvalues = complex_array("eigenvalues_per_s")
         m = len(self.eigenvalues)
         self.input_matrix = complex_array("input_matrix").reshape(m, len(model["inputs"]))
-        self.trained_amplitude = np.array(model["trained_amplitude"])
+        self.trained_facets = np.array(model["trained_facets"])
         has_terms = len(model["normal_form"]["exponents"]) > 0
         self.normal_form = Polynomial(model["normal_form"], True) if has_terms else None
         self.chart = Polynomial(model["chart"], True)
@@ -132,7 +132,7 @@ class RomgenSlave(Fmi2Slave):
             raise ValueError("a value is not finite")
 
     def _trust_ratio(self) -> float:
-        return float(np.max(np.abs(self.z) / self.trained_amplitude))
+        return float(np.max(self.trained_facets @ np.abs(self.z)))
 
     def _inside(self) -> bool:
         return self._trust_ratio() <= self.parameters["trust_radius"]

@@ -34,7 +34,7 @@ class Backbone:
     damping_ratio : (n,) -Re(z'/z) / theta'.
     sensors : names of the columns of the amplitudes.
     amplitude_max, amplitude_sqrt2_rms, mean : (n, n_sensor) over one period, m (``romgen.lifted_orbit``).
-    exceeds_trained_range : (n,) some abs(z_j) is larger than in training.
+    exceeds_trained_range : (n,) outside the trained range (``romgen.trained_range``).
     notes : what was dropped or not reached.
     """
 
@@ -189,6 +189,6 @@ def _record(
         amplitude_max=amplitudes.max,
         amplitude_sqrt2_rms=amplitudes.sqrt2_rms,
         mean=amplitudes.mean,
-        exceeds_trained_range=np.any(np.abs(q) > model.trained_amplitude * (1.0 + 1e-12), axis=1),
+        exceeds_trained_range=model.trained_range.exceeded(q),
         notes=notes,
     )

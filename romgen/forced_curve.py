@@ -55,7 +55,7 @@ class ForcedCurve:
     stable : (n,) all Floquet multipliers inside the unit circle.
     amplitude_max, amplitude_sqrt2_rms, mean : (n, n_sensor) over one period, mean not removed, m.
     damping_ratio : (n,) instantaneous damping of the forced mode, Re(f / q) / Omega = -Re(n / q) / Omega.
-    exceeds_trained_range : (n,) some abs(q_j) is larger than in training.
+    exceeds_trained_range : (n,) q lies outside the trained range (``romgen.trained_range``).
     folds_hz, fold_index : located folds and their rows.
     hopf_hz : located torus (Neimark-Sacker) points, Hopf points of the rotating frame.
     period_doubling_hz, branch_point_hz : located period doublings and branch points.
@@ -166,7 +166,7 @@ def forced_curve(
         amplitude_sqrt2_rms=amplitudes.sqrt2_rms,
         mean=amplitudes.mean,
         damping_ratio=_damping(load, q_forced, branch.p),
-        exceeds_trained_range=np.any(np.abs(q) > model.trained_amplitude, axis=1),
+        exceeds_trained_range=model.trained_range.exceeded(q),
         folds_hz=_hz(branch, "fold"),
         fold_index=np.array([point.index for point in branch.located("fold")], dtype=np.int64),
         hopf_hz=_hz(branch, "torus"),

@@ -226,7 +226,7 @@ def _notes(
         rows = ", ".join(str(j + 1) for j in np.flatnonzero(frame.dropped_load))
         notes.append(f"the load on mode {rows} is not resonant: it enters the orbit to first order only")
     if any(np.any(curve.exceeds_trained_range) for curve in curves):
-        notes.append("some points lie beyond the trained amplitude: see exceeds_trained_range")
+        notes.append("some points lie outside the trained range: see exceeds_trained_range")
     stopped = sorted({f"level {curve.level:g}: {end}" for curve in curves for end in curve.ends} - _regular(curves))
     return (*notes, *(f"a branch does not reach the end of the range, {reason}" for reason in stopped))
 

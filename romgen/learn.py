@@ -19,11 +19,13 @@ from romgen.reduced_dynamics import LinearPart
 from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
+from romgen.stability import tried_stability
 from romgen.trajectory import Trajectory
 from romgen.trajectory_error import TrajectoryError, snapshot_rows, trajectory_error
 from romgen.trajectory_fit import fit_on_trajectories
 
-# The full field is nearly linear plus quadratic in y; higher terms would cost n_dof numbers each.
+# The full field and the sensors are nearly linear plus quadratic in y. Higher terms lower the static error by less than
+# a hundredth of the error of the motion, cost n_dof numbers each, and grow beyond all bounds outside the range.
 FIELD_ORDER = 3
 
 
@@ -151,13 +153,12 @@ def assemble(
 
     Parameters
     ----------
-    training : gives the sensor maps and the trained amplitude.
+    training : gives the sensor maps.
     """
     y = np.vstack([r.y for r in training])
     dynamics = fit.dynamics
     m = len(dynamics.eigenvalues)
-    order = settings.geometry_order or int(fit.normal_form.exponents.sum(axis=1).max())
-    table, maps = exponents(2 * m, 1, order), []
+    table, maps = exponents(2 * m, 1, settings.geometry_order or FIELD_ORDER), []
     for x in (np.vstack([r.displacement for r in training]), np.vstack([r.velocity for r in training])):
         regression = ManifoldFit(x.shape[1], table, dynamics.scale)
         regression.add(x, y)
@@ -178,7 +179,9 @@ def assemble(
         input_units=() if loads is None else loads.units,
         input_matrix=(dynamics.inverse @ force).astype(np.complex128),
         internal_resonance=fit.resonance.internal_resonance,
-        trained_amplitude=fit.amplitude,
+        trained_amplitude=fit.trained_range.amplitude,
+        trained_facets=fit.trained_range.facets,
+        stability=tried_stability(dynamics.eigenvalues, fit.normal_form, fit.trained_range),
     )
 
 

@@ -16,6 +16,8 @@ from romgen.trajectory_error import TrajectoryError
 
 # Share of the largest motion; an offset of one percent is as large as the error aimed at.
 NOTED_REST_PERCENT = 1.0
+# Starts that the training motions nearly reach are not worth a note.
+NOTED_DISTANCE = 1.05
 
 
 def learning_notes(
@@ -24,7 +26,7 @@ def learning_notes(
     model: ReducedModel,
     errors: Sequence[TrajectoryError],
 ) -> tuple[str, ...]:
-    """Return what was resampled, which motions diverge, and which come to rest off the equilibrium.
+    """Return what was resampled, whether the model decays in its range, and which motions it cannot follow and why.
 
     Parameters
     ----------
@@ -32,7 +34,13 @@ def learning_notes(
     chart : None with modal coordinates.
     errors : of the model on all trajectories.
     """
-    return (*_chart_notes(trajectories, chart), *_divergences(model, errors), *_rests(errors))
+    return (
+        *_chart_notes(trajectories, chart),
+        *_stability(model),
+        *_divergences(model, errors),
+        *_outside(model, errors),
+        *_rests(errors),
+    )
 
 
 def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) -> Iterator[str]:
@@ -47,8 +55,11 @@ def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) 
 
 def choice_sentence(orders: OrderTable) -> str:
     """Return order and method of the normal form with the errors that decided."""
-    rows = zip(orders.tried, orders.methods, orders.nmte_percent, strict=True)
-    tried = ", ".join(f"order {order} on {method} {error:.3g} %" for order, method, error in rows)
+    rows = zip(orders.tried, orders.methods, orders.nmte_percent, orders.stable, strict=True)
+    tried = ", ".join(
+        f"order {order} on {method} {error:.3g} %" + ("" if stable else " (not stable in its range)")
+        for order, method, error, stable in rows
+    )
     return (
         f"normal form of order {orders.order} fitted on {orders.method}: "
         f"mean NMTE of held-out blocks of the training data was {tried}"
@@ -58,11 +69,33 @@ def choice_sentence(orders: OrderTable) -> str:
 def _divergences(model: ReducedModel, errors: Sequence[TrajectoryError]) -> Iterator[str]:
     for error in errors:
         if not np.isfinite(error.nmte_percent):
-            lost = error.t[int(np.isnan(error.predicted).any(axis=1).argmax())]
+            distance = float(model.trained_range.distance(error.start[None])[0])
+            guess = "" if error.start_fitted else " (of its first sample: it diverges within the first periods)"
             yield (
-                f"the model diverges on '{error.name}' at t = {lost:.4g} s: it starts at abs(z) = "
-                f"{_numbers(error.start)}, trained were {_numbers(model.trained_amplitude)}; "
+                f"the model diverges on '{error.name}' at t = {error.diverged_s:.4g} s: it starts at abs(z) = "
+                f"{_numbers(error.start)}{guess}, {distance:.3g} times the trained range, trained were "
+                f"{_numbers(model.trained_amplitude)}; "
                 "train on motions that reach these amplitudes, or lower [learn] order"
+            )
+
+
+def _stability(model: ReducedModel) -> Iterator[str]:
+    tried = model.stability
+    if tried is not None and not tried.is_stable:
+        yield (
+            f"the model is not stable in its trained range: {100 * (1 - tried.share[0]):.0f} % of {tried.starts} free "
+            "motions from the boundary of the range do not decay; add training motions in which several modes are "
+            "large at once, or lower [learn] order"
+        )
+
+
+def _outside(model: ReducedModel, errors: Sequence[TrajectoryError]) -> Iterator[str]:
+    for error in errors:
+        distance = float(model.trained_range.distance(error.start[None])[0])
+        if np.isfinite(error.nmte_percent) and distance > NOTED_DISTANCE:
+            yield (
+                f"trajectory '{error.name}' starts at {distance:.2f} times the trained range: its error is that of an "
+                "extrapolation"
             )
 
 

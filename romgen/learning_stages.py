@@ -14,6 +14,7 @@ from romgen.reduced_model import ReducedModel
 from romgen.settings import Study
 from romgen.stage import Context, Stage
 from romgen.structure import Modes
+from romgen.trajectory_error import TrajectoryError
 
 log = logging.getLogger(__name__)
 
@@ -31,9 +32,19 @@ def learn_model(context: Context) -> Learned:
         trajectories.training, trajectories.validation, study.learn, study.name, _loads(context), _linear(context)
     )
     log.info("%s", learned.choice)
-    for note in learned.notes:
+    for note in (*learned.notes, *_unjudged(learned, study)):
         log.warning("%s", note)
     return learned
+
+
+def _unjudged(learned: Learned, study: Study) -> tuple[str, ...]:
+    """Say what [acceptance] does not judge for lack of data."""
+    if learned.validation:
+        return ()
+    return (
+        "no validation trajectory: all errors are those of training motions, and [acceptance] nmte_percent = "
+        f"{study.acceptance.nmte_percent:g} judges nothing of the learning",
+    )
 
 
 def _loads(context: Context) -> Loads | None:
@@ -64,6 +75,26 @@ def learned_model(context: Context) -> ReducedModel:
     return learned(context).model
 
 
+def _distance(model: ReducedModel, error: TrajectoryError) -> float:
+    return float(model.trained_range.distance(error.start[None])[0])
+
+
+def _stability(model: ReducedModel) -> dict[str, Any]:
+    tried = model.stability
+    if tried is None:
+        return {}
+    part = {
+        "stable": tried.is_stable,
+        "reach": tried.reach,
+        "factor": tried.factor,
+        "decaying_share": tried.share,
+        "slowest_rate_per_s": tried.slowest_rate,
+        "linear_rate_per_s": tried.linear_rate,
+        "starts": tried.starts,
+    }
+    return {"stability": part}
+
+
 def learning_summary(context: Context) -> dict[str, Any]:
     """Return the part "learn" of summary.json."""
     record = learned(context)
@@ -74,6 +105,8 @@ def learning_summary(context: Context) -> dict[str, Any]:
         "eigenvalues_per_s": record.model.eigenvalues,
         "internal_resonance": record.model.internal_resonance,
         "trained_amplitude": record.model.trained_amplitude,
+        "trained_facets": record.model.trained_range.facets,
+        **_stability(record.model),
         "nmte_percent": {role: {e.name: e.nmte_percent for e in errors} for role, errors in roles.items()},
         "sensor_nmte_percent": {
             role: {e.name: e.sensor_nmte_percent for e in errors} for role, errors in roles.items()
@@ -83,4 +116,8 @@ def learning_summary(context: Context) -> dict[str, Any]:
         },
         "rest_percent": {role: {e.name: e.rest_percent for e in errors} for role, errors in roles.items()},
         "static_percent": {role: {e.name: e.static_percent for e in errors} for role, errors in roles.items()},
+        "diverged_s": {role: {e.name: e.diverged_s for e in errors} for role, errors in roles.items()},
+        "start_distance": {
+            role: {e.name: _distance(record.model, e) for e in errors} for role, errors in roles.items()
+        },
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from romgen.reduced_dynamics import LinearPart, ReducedDynamics, fit_reduced_dyn
 from romgen.regression import ridge_fit
 from romgen.resonance import ResonanceTable, automatic_resonance, gap_resonance, integer_resonance, trivial_resonance
 from romgen.substitution import substitute_linear
+from romgen.trained_range import TrainedRange, trained_range
 
 # Rows used by the conjugacy fit: a few thousand phases and amplitudes determine all coefficients.
 FIT_SAMPLES = 4000
@@ -41,7 +42,7 @@ class NormalFormFit:
     normal_form : N, (m, n_term) over zeta, nonlinear terms, 1/s.
     chart : T, (2m, n_term) over zeta, w = Re(T zeta^E).
     inverse_chart : H, (m, n_term) over w.
-    amplitude : (m,) largest abs(z_j) of the training motions.
+    trained_range : amplitudes of the training motions.
     chart_error_percent : mean over samples of abs(w - Re(T zeta^E)) over the largest abs(w).
     replicates : coefficients without a block of the data each; None where they were not asked for.
     """
@@ -52,7 +53,7 @@ class NormalFormFit:
     normal_form: PolynomialMap[np.complex128]
     chart: PolynomialMap[np.complex128]
     inverse_chart: PolynomialMap[np.complex128]
-    amplitude: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
+    trained_range: TrainedRange
     chart_error_percent: float
     replicates: Replicates | None = None
 
@@ -94,7 +95,7 @@ def fit_normal_form(
         PolynomialMap(table.exponents, conjugacy.B),
         chart,
         inverse_chart(dynamics, table.exponents, conjugacy.A),
-        np.abs(z).max(axis=0),
+        trained_range(z),
         relative_error_percent(w, evaluate(chart, zeta(z)).real),
     )
 

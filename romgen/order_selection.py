@@ -19,7 +19,8 @@ from romgen.reduced_dynamics import LinearPart, modal_samples
 from romgen.reduced_model import ReducedModel
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate
-from romgen.trajectory_fit import growing_fits, growing_orders, is_long_enough, masked
+from romgen.stability import tried_stability
+from romgen.trajectory_fit import growing_fits, is_long_enough, masked
 
 CANDIDATES = (3, 5, 7)
 # Alternate blocks train and test; eight per trajectory leave several beats of two modes in each.
@@ -30,6 +31,8 @@ BLOCKS, FOLDS = 8, 2
 IMPROVEMENT: dict[str, float] = {"conjugacy": 0.9, "trajectories": 1.0}
 # A block that diverges, or misses by more, counts with this NMTE in percent: the motion was not predicted at all.
 LOST_PERCENT = 100.0
+# The error of a fit whose free motions in the trained range do not all decay counts this many times.
+UNSTABLE = 2.0
 # Conjugacy fits that predict held-out blocks within this NMTE in percent need no (far slower) fit on trajectories.
 GOOD_PERCENT = 1.0
 
@@ -52,6 +55,8 @@ class OrderTable:
         relative to the largest norm of their whole trajectory; a block that diverges counts 100 %; inf where a fit
         failed.
     scored, lost : (n_tried,) number of blocks in the mean, and how many of them counted 100 %.
+    stable : (n_tried,) whether all free motions from the boundary of the trained range decay in both folds; an order
+        for which they do not is taken only where its error is less than half that of the others.
     """
 
     order: int
@@ -61,6 +66,7 @@ class OrderTable:
     nmte_percent: FloatArray = field(metadata={"unit": "%", "axes": "order"})
     scored: IntArray = field(metadata={"unit": "1", "axes": "order"})
     lost: IntArray = field(metadata={"unit": "1", "axes": "order"})
+    stable: BoolArray = field(metadata={"unit": "1", "axes": "order"})
 
 
 @dataclass(frozen=True)
@@ -68,11 +74,17 @@ class _Trial:
     order: int
     method: Method
     errors: FloatArray
+    stable: bool
 
     @property
     def mean(self) -> float:
         """Mean over blocks in percent."""
         return float(self.errors.mean()) if self.errors.size else float("inf")
+
+    @property
+    def score(self) -> float:
+        """What decides: the mean, larger where the fits are not stable."""
+        return self.mean if self.stable else UNSTABLE * self.mean
 
 
 def choose_order(
@@ -89,10 +101,10 @@ def choose_order(
     """
     orders = CANDIDATES if settings.order == "auto" else (int(settings.order),)
     trials, best = _improving(_conjugacy_trials(training, orders, (settings, known)))
-    if best.mean > GOOD_PERCENT and is_long_enough(training):
+    if best.score > GOOD_PERCENT and is_long_enough(training):
         more, other = _improving(_trajectory_trials(training, orders, (settings, known)))
         trials += more
-        best = min(best, other, key=lambda trial: trial.mean)
+        best = min(best, other, key=lambda trial: trial.score)
     if not best.mean < LOST_PERCENT:
         raise NumericalError(
             "no order gives a stable model", where="learn order", value=orders, advice="give longer or cleaner decays"
@@ -105,6 +117,7 @@ def choose_order(
         nmte_percent=np.array([trial.mean for trial in trials]),
         scored=np.array([trial.errors.size for trial in trials]),
         lost=np.array([int((trial.errors >= LOST_PERCENT).sum()) for trial in trials]),
+        stable=np.array([trial.stable for trial in trials]),
     )
 
 
@@ -114,7 +127,7 @@ def _improving(trials: Iterator[_Trial]) -> tuple[list[_Trial], _Trial]:
     best = tried[0]
     for trial in trials:
         tried.append(trial)
-        if not trial.mean < IMPROVEMENT[trial.method] * best.mean and np.isfinite(best.mean):
+        if not trial.score < IMPROVEMENT[trial.method] * best.score and np.isfinite(best.score):
             break
         best = trial
     return tried, best
@@ -126,15 +139,17 @@ def _conjugacy_trials(
     settings, known = given
     for order in orders:
         errors: list[float] = []
+        stable = True
         for kept in _folds(training):
             seen = [block for r, keep in zip(training, kept, strict=True) for block in _runs(r, keep)]
             try:
                 fit = fit_normal_form(seen, order, settings.internal_resonance, settings.ridge, known)
             except NumericalError:
-                errors = []
+                errors, stable = [], False
                 break
             errors += _held_out_errors(fit, training, kept)
-        yield _Trial(order, "conjugacy", np.array(errors))
+            stable = stable and is_stable(fit)
+        yield _Trial(order, "conjugacy", np.array(errors), stable)
 
 
 def _trajectory_trials(
@@ -142,20 +157,23 @@ def _trajectory_trials(
 ) -> Iterator[_Trial]:
     settings, known = given
     folds = _folds(training)
-    steps = sorted({*growing_orders(orders[0]), *orders})
     options = (settings.internal_resonance, settings.ridge, known)
-    fits = [growing_fits(training, kept, steps, options) for kept in folds]
-    for order in steps:
+    fits = [growing_fits(training, kept, orders, options) for kept in folds]
+    for order in orders:
         try:
             grown = [next(fit) for fit in fits]
         except NumericalError:
-            yield _Trial(order, "trajectories", np.zeros(0))
+            yield _Trial(order, "trajectories", np.zeros(0), False)
             return
-        if order in orders:
-            errors = [
-                error for fit, kept in zip(grown, folds, strict=True) for error in _held_out_errors(fit, training, kept)
-            ]
-            yield _Trial(order, "trajectories", np.array(errors))
+        errors = [
+            error for fit, kept in zip(grown, folds, strict=True) for error in _held_out_errors(fit, training, kept)
+        ]
+        yield _Trial(order, "trajectories", np.array(errors), all(is_stable(fit) for fit in grown))
+
+
+def is_stable(fit: NormalFormFit) -> bool:
+    """Whether free motions from the boundary of the trained range all decay."""
+    return tried_stability(fit.dynamics.eigenvalues, fit.normal_form, fit.trained_range, (1.0,)).is_stable
 
 
 def _held_out_errors(

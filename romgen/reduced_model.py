@@ -8,6 +8,8 @@ import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.polynomial import PolynomialMap
+from romgen.stability import Stability
+from romgen.trained_range import TrainedRange, box_range
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class ReducedModel:
     input_matrix : G, (m, n_input) complex, 1/s per input unit.
     internal_resonance : integers r_j of the master modes, e.g. (1, 2); () without resonance.
     trained_amplitude : (m,) largest abs(z_j) over the training data.
+    trained_facets : (n_facet, m) of ``trained_range``; None is the box abs(z_j) <= trained_amplitude_j.
+    stability : free decays that were tried; None where none were.
     """
 
     name: str
@@ -54,3 +58,10 @@ class ReducedModel:
     input_matrix: ComplexArray = field(metadata={"unit": "1/s per input unit", "axes": "mode,input"})
     internal_resonance: tuple[int, ...]
     trained_amplitude: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
+    trained_facets: FloatArray | None = field(default=None, metadata={"unit": "1", "axes": "facet,mode"})
+    stability: Stability | None = None
+
+    @property
+    def trained_range(self) -> TrainedRange:
+        """Amplitudes that the training motions passed through, with the distance measure of ``trust_ratio``."""
+        return box_range(self.trained_amplitude) if self.trained_facets is None else TrainedRange(self.trained_facets)

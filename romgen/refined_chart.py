@@ -15,6 +15,7 @@ from romgen.reduced_dynamics import ReducedDynamics
 from romgen.refinement import RefinedDynamics, Segment, simulated
 from romgen.regression import ridge_fit
 from romgen.resonance import ResonanceTable
+from romgen.trained_range import trained_range
 
 
 def refined_normal_form(
@@ -60,7 +61,7 @@ def refined_normal_form(
         normal_form=PolynomialMap(model.exponents, model.B),
         chart=chart,
         inverse_chart=PolynomialMap(inverse_terms, H),
-        amplitude=np.abs(z).max(axis=0),
+        trained_range=trained_range(z),
         chart_error_percent=relative_error_percent(seen, w[:, :m]),
     )
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from romgen.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from romgen.dissipation import Demand, penalty
 from romgen.etdrk4 import march
 from romgen.output_map import OutputMap, ProjectedRow, output_map, project, slopes
 from romgen.resonance import ResonanceTable
@@ -68,7 +69,8 @@ class RefinedDynamics:
     amplitude : (m,) corner of the data, largest abs(z_j) over all motions.
     exponents : (n_term, 2m) degree >= 2; resonant : (m, n_term) terms of B; B : (m, n_term) 1/s.
     output : terms of the displacement; C : (m, n_output) their coefficients; rest : (n_motion, m) rest positions.
-    cost : relative mean square misfit with priors.
+    cost : relative mean square misfit with priors and penalty.
+    demand : where dissipation is demanded; None demands none.
     """
 
     eigenvalues: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
@@ -82,6 +84,7 @@ class RefinedDynamics:
     rest: FloatArray = field(metadata={"unit": "unit of eta", "axes": "motion,mode"})
     cost: float = float("inf")
     keep_linear: bool = False
+    demand: Demand | None = None
 
 
 @dataclass(frozen=True)
@@ -105,23 +108,21 @@ def refine(
     segments = tuple(segments)
     if not np.isfinite(_cost(model, segments, max_step)):
         return model, segments
-    here = _linearise(model, segments, max_step)
+    here = linearise(model, segments, max_step)
     damping = 1e-3
     for _ in range(steps):
-        accepted = False
         for _ in range(MAX_REJECTIONS):
             change = _step(here, damping)
-            trial_model, trial_segments = _moved(here.model, segments, change)
+            trial_model, trial_segments = moved(here.model, segments, change)
             cost = _cost(trial_model, trial_segments, max_step)
             if cost < here.model.cost:
-                accepted = True
                 break
             damping *= 8.0
-        if not accepted:
+        else:
             break
         gain = (here.model.cost - cost) / here.model.cost
         segments, damping = trial_segments, max(damping / 8.0, 1e-9)
-        here = _linearise(trial_model, segments, max_step)
+        here = linearise(trial_model, segments, max_step)
         if gain < decrease:
             break
     return here.model, segments
@@ -157,7 +158,7 @@ def replicates(
             kept = (*segments[:number], fewer, *segments[number + 1 :])
             tied = replace(model, reference=references[number * blocks + block])
             here = _normal_equations(tied, kept, motion)
-            models.append(_moved(model, kept, _step(here, 0.0))[0])
+            models.append(moved(model, kept, _step(here, 0.0))[0])
     return models
 
 
@@ -187,9 +188,10 @@ def simulated(model: RefinedDynamics, segments: Sequence[Segment], max_step: flo
     return runs
 
 
-def _moved(
+def moved(
     model: RefinedDynamics, segments: tuple[Segment, ...], change: FloatArray
 ) -> tuple[RefinedDynamics, tuple[Segment, ...]]:
+    """Return model and segments with ``change`` (n_unknown,) added: (Re, Im) pairs of Lambda and B, then the starts."""
     m = len(model.eigenvalues)
     rows, terms = np.nonzero(model.resonant)
     shared = 2 * (m + len(rows))
@@ -197,10 +199,8 @@ def _moved(
     B = model.B.copy()
     B[rows, terms] += delta[m:]
     starts = change[shared:].reshape(len(segments), 2 * m)
-    moved = tuple(
-        replace(segment, z0=segment.z0 + d[:m] + 1j * d[m:]) for segment, d in zip(segments, starts, strict=True)
-    )
-    return replace(model, eigenvalues=model.eigenvalues + delta[:m], B=B), moved
+    started = tuple(replace(s, z0=s.z0 + d[:m] + 1j * d[m:]) for s, d in zip(segments, starts, strict=True))
+    return replace(model, eigenvalues=model.eigenvalues + delta[:m], B=B), started
 
 
 def _prior(model: RefinedDynamics) -> tuple[FloatArray, FloatArray]:
@@ -216,6 +216,11 @@ def _prior(model: RefinedDynamics) -> tuple[FloatArray, FloatArray]:
     values = np.concatenate([model.eigenvalues - model.reference, model.B[rows, terms]])
     weight = (PRIOR_ERROR * np.column_stack([real, imag]).ravel()) ** 2
     return weight, np.column_stack([values.real, values.imag]).ravel()
+
+
+def growth(model: RefinedDynamics) -> tuple[float, FloatArray, FloatArray]:
+    """Return the penalty on missing dissipation, half its gradient and its Gauss-Newton Hessian over Lambda and B."""
+    return penalty(model.demand, model.exponents, model.resonant, (model.eigenvalues, model.B))
 
 
 def _projected(
@@ -241,10 +246,11 @@ def _cost(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float
             return float("inf")
     rows, _, norm = _projected(model, z, segments)
     weight, value = _prior(model)
-    return sum(float(row.residual @ row.residual) + row.penalty for row in rows) / norm + float(weight @ value**2)
+    misfit = sum(float(row.residual @ row.residual) + row.penalty for row in rows) / norm
+    return misfit + float(weight @ value**2) + growth(model)[0]
 
 
-def _linearise(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float) -> _Linearised:
+def linearise(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float) -> _Linearised:
     """Simulate all segments with sensitivities, eliminate C, and return cost, gradient and Gauss-Newton Hessian."""
     return _normal_equations(model, segments, _sensitivities(model, segments, max_step))
 
@@ -258,11 +264,12 @@ def _normal_equations(
     C, rest = np.array([row.C for row in rows]), np.array([row.rest for row in rows]).T
     s = slopes(model.output, C, z)
     weight, value = _prior(model)
-    tied = np.zeros(S.shape[2])
-    tied[: len(weight)] = weight
-    hessian, gradient = np.diag(tied), np.zeros(len(tied))
-    gradient[: len(weight)] = weight * value
-    cost = float(weight @ value**2)
+    cost, slope, curvature = growth(model)
+    shared, n = len(weight), S.shape[2]
+    hessian, gradient = np.zeros((n, n)), np.zeros(n)
+    hessian[:shared, :shared] = np.diag(weight) + curvature
+    gradient[:shared] = weight * value + slope
+    cost += float(weight @ value**2)
     for j, row in enumerate(rows):
         J = share[:, None] * np.einsum("ti,tic->tc", s[:, j], S).real
         hessian += row.reduced(J) / norm

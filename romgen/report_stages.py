@@ -101,9 +101,9 @@ def _deviation(record: Learned) -> FloatArray | None:
 def _orders(record: Learned) -> tuple[OrderTrial, ...]:
     """The orders that cross-validation over the training motions tried."""
     table = record.orders
-    trials = zip(table.tried.tolist(), table.methods, table.nmte_percent.tolist(), strict=True)
+    trials = zip(table.tried.tolist(), table.methods, table.nmte_percent.tolist(), table.stable.tolist(), strict=True)
     best = (table.order, table.method)
-    return tuple(OrderTrial(order, error, (order, method) == best) for order, method, error in trials)
+    return tuple(OrderTrial(order, error, (order, method) == best, stable) for order, method, error, stable in trials)
 
 
 def _optional(context: Context, stage: str, cls: type[Record]) -> Record | None:

@@ -6,7 +6,7 @@ import os
 import types
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -50,11 +50,11 @@ def write_record(group: h5py.Group, record: DataclassInstance) -> None:
 
 
 def read_record(group: h5py.Group, cls: type[Record]) -> Record:
-    """Read a record of type ``cls`` that ``write_record`` wrote.
+    """Read a record of type ``cls`` that ``write_record`` wrote; fields that an older file lacks take their default.
 
     Raises
     ------
-    StoreError : the group holds another record, another schema, or lacks a field.
+    StoreError : the group holds another record, another schema, or lacks a field without default.
     """
     where = f"{group.file.filename}:{group.name}"
     name = getattr(get_origin(cls) or cls, "__name__", str(cls))
@@ -72,6 +72,8 @@ def read_record(group: h5py.Group, cls: type[Record]) -> Record:
     values = {}
     for item in fields(origin):
         if item.name not in group:
+            if item.default is not MISSING:
+                continue
             raise StoreError(f"field '{item.name}' of {name} is missing", where=where)
         values[item.name] = _read(group[item.name], hints[item.name])
     result: Record = origin(**values)

@@ -37,6 +37,9 @@ class TrajectoryError:
         the largest norm: what lies between the rest position of the motion and the equilibrium of the model; nan where
         the model diverges.
     start : (m,) z of the model at t[0].
+    start_fitted : whether the start fits the first window; False where the model diverges within it from every start
+        that was tried, and the inverse of the linear chart at the first sample was taken.
+    diverged_s : time on the axis t from which the model has left all bounds, s; nan where it never does.
     t : (n_time,) s; displacement, predicted : (n_time, n_sensor) m, predicted is nan from a divergence on.
     """
 
@@ -47,6 +50,8 @@ class TrajectoryError:
     static_percent: float
     rest_percent: float
     start: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
+    start_fitted: bool
+    diverged_s: float
     t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
     displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
     predicted: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
@@ -56,8 +61,10 @@ def trajectory_error(
     model: ReducedModel, r: ReducedTrajectory, trajectory: Trajectory, full: Manifold | None
 ) -> TrajectoryError:
     """Simulate from the first window of a trajectory and compare with all of it."""
-    z0, z = _from_first_window(model, r)
-    finite = np.isfinite(z).all()
+    z0, fitted = _first_window(model, r)
+    z = free_motion(model, r.t, z0)
+    lost = ~np.isfinite(z).all(axis=1)
+    finite = not lost.any()
     predicted = sensors(model, z)[0]
     sensor_error = nmte_percent(r.displacement, predicted) if finite else float("inf")
     unfitted = free_motion(model, r.t, chart_inverse(model, r.y[0])[0])
@@ -68,7 +75,20 @@ def trajectory_error(
         error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
     static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
     rest = _rest_percent(r, predicted, model)
-    return TrajectoryError(r.name, error, sensor_error, cold, static, rest, z0, r.t, r.displacement, predicted)
+    return TrajectoryError(
+        name=r.name,
+        nmte_percent=error,
+        sensor_nmte_percent=sensor_error,
+        first_sample_percent=cold,
+        static_percent=static,
+        rest_percent=rest,
+        start=z0,
+        start_fitted=fitted,
+        diverged_s=float("nan") if finite else float(r.t[int(lost.argmax())]),
+        t=r.t,
+        displacement=r.displacement,
+        predicted=predicted,
+    )
 
 
 def _rest_percent(r: ReducedTrajectory, predicted: FloatArray, model: ReducedModel) -> float:
@@ -78,13 +98,12 @@ def _rest_percent(r: ReducedTrajectory, predicted: FloatArray, model: ReducedMod
     return 100.0 * float(np.linalg.norm(misfit) / np.linalg.norm(r.displacement, axis=1).max())
 
 
-def _from_first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, ComplexArray]:
-    """Return the start and the motion of the model, nan from a divergence on."""
+def _first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, bool]:
+    """Return the start, and whether it was fitted; where the model diverges in the window it comes from one sample."""
     try:
-        z0 = fitted_start(model, r)
+        return fitted_start(model, r), True
     except NumericalError:
-        z0 = linear_start(model, r.y[0])
-    return z0, free_motion(model, r.t, z0)
+        return linear_start(model, r.y[0]), False
 
 
 def snapshot_rows(trajectory: Trajectory, r: ReducedTrajectory) -> tuple[IntArray, npt.NDArray[np.float32]]:

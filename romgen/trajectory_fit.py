@@ -11,6 +11,7 @@ import numpy as np
 from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import DROPPED, first_derivative, is_uniform
+from romgen.dissipative_fit import dissipative
 from romgen.jackknife import Replicates, blocks_of
 from romgen.metrics import analytic_signal
 from romgen.normal_form import NormalFormFit, Resonance, resonance_table
@@ -70,7 +71,7 @@ def fit_on_trajectories(
     NumericalError : the linear part does not decay.
     """
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
-    last = list(_grown(training, everything, growing_orders(order), (internal_resonance, ridge, known)))[-1]
+    last = next(_grown(training, everything, (order,), (internal_resonance, ridge, known)))
     table = resonance_table(last.dynamics.eigenvalues, min(order, START_ORDER), internal_resonance)
     references = _references(training, last.dynamics, table, keep_linear=known is not None)
     others = replicates(last.model, last.segments, last.max_step, references)
@@ -89,21 +90,23 @@ def growing_fits(
     orders: Sequence[int],
     settings: tuple[Resonance, float, LinearPart | None],
 ) -> Iterator[NormalFormFit]:
-    """Start from band-passed modal coordinates at the first order, refine, grow to the next, refine, ..
+    """Start from band-passed modal coordinates at order 3, refine, grow to the next odd order, refine, ..
 
-    Up to order 5 every motion is first cut into segments with initial states of their own: over a whole motion the
-    frequencies of the start are wrong by periods, and the cost has minima that are off by one.
+    An order that is asked for is then refined once more with dissipation demanded in and around the trained range;
+    growth goes on from the fit without. Up to order 5 every motion is first cut into segments with initial states of
+    their own: over a whole motion the frequencies of the start are wrong by periods, and the cost has minima that are
+    off by one.
 
     Parameters
     ----------
     training : uniform, at least 20 periods long.
     kept : (n_time,) per trajectory, samples that count; simulation passes through the others.
-    orders : increasing.
+    orders : those to yield, increasing.
     settings : internal resonance; ridge of the linear part and of the inverse chart; linear part to keep or None.
 
     Yields
     ------
-    The normal form of each order.
+    The normal form of each of the ``orders``.
     """
     for state in _grown(training, kept, orders, settings):
         yield state.normal_form(settings[1])
@@ -115,8 +118,8 @@ class _Refined:
 
     dynamics: ReducedDynamics
     model: RefinedDynamics
-    table: ResonanceTable
     segments: tuple[Segment, ...]
+    table: ResonanceTable
     max_step: float
 
     def normal_form(self, ridge: float) -> NormalFormFit:
@@ -130,24 +133,26 @@ def _grown(
     settings: tuple[Resonance, float, LinearPart | None],
 ) -> Iterator[_Refined]:
     internal_resonance, ridge, known = settings
+    grown = sorted({*growing_orders(orders[0]), *orders})
     seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
-    dynamics = fit_reduced_dynamics(seen, min(orders[0], START_ORDER), ridge, known)
+    dynamics = fit_reduced_dynamics(seen, min(grown[0], START_ORDER), ridge, known)
     signals = [_signals(dynamics, r) for r in training]
-    table = resonance_table(dynamics.eigenvalues, orders[0], internal_resonance)
+    table = resonance_table(dynamics.eigenvalues, grown[0], internal_resonance)
     model = _start(dynamics, training, (signals, kept), table, keep_linear=known is not None)
     max_step = 2.0 * np.pi / (20.0 * float(dynamics.eigenvalues.imag.max()))
     shots = _segments(dynamics, training, (signals, kept), SHOTS)
     whole = _segments(dynamics, training, (signals, kept), 1)
     first = [next(k for k, s in enumerate(shots) if s.motion == number) for number in range(len(training))]
     shooting = model
-    for order in orders:
+    for order in grown:
         table = resonance_table(dynamics.eigenvalues, order, internal_resonance)
-        if order <= SHOT_ORDER or order == orders[0]:
+        if order <= SHOT_ORDER or order == grown[0]:
             shooting, shots = refine(regrown(shooting, table), shots, max_step, SHOT_STEPS, SHOT_DECREASE)
             model = shooting
             whole = tuple(replace(s, z0=shots[k].z0) for s, k in zip(whole, first, strict=True))
         model, whole = refine(regrown(model, table), whole, max_step, STEPS, DECREASE)
-        yield _Refined(dynamics, model, table, whole, max_step)
+        if order in orders:
+            yield _Refined(dynamics, *dissipative(model, whole, max_step), table, max_step)
 
 
 def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:

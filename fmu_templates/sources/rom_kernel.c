@@ -142,17 +142,29 @@ void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out)
     out->trust_ratio = rom_trust_ratio(z);
 }
 
-/* d|z_j| = Re(conj z_j dz_j) / |z_j|, d arg z_j = Im(conj z_j dz_j) / |z_j|^2, both taken as 0 at rest; the trust ratio follows the mode that leads it */
+/* n_k . r of one facet of the trained range */
+static double facet_value(size_t k, const double r[])
+{
+    double sum = 0.0;
+    for (size_t j = 0; j < N_MODE; ++j)
+        sum += trained_facet[k][j] * r[j];
+    return sum;
+}
+
+/* d|z_j| = Re(conj z_j dz_j) / |z_j|, d arg z_j = Im(conj z_j dz_j) / |z_j|^2, both taken as 0 at rest; the trust ratio follows the facet that leads it */
 static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
 {
-    double leading = -1.0;
+    double r[N_MODE], leading = -1.0;
     for (size_t j = 0; j < N_MODE; ++j) {
-        const double r = modulus(z[j]);
-        dout->amplitude[j] = r > 0.0 ? (z[j].re * dz[j].re + z[j].im * dz[j].im) / r : 0.0;
-        dout->phase[j] = r > 0.0 ? (z[j].re * dz[j].im - z[j].im * dz[j].re) / r / r : 0.0;
-        if (r / trained_amplitude[j] > leading) {
-            leading = r / trained_amplitude[j];
-            dout->trust_ratio = dout->amplitude[j] / trained_amplitude[j];
+        r[j] = modulus(z[j]);
+        dout->amplitude[j] = r[j] > 0.0 ? (z[j].re * dz[j].re + z[j].im * dz[j].im) / r[j] : 0.0;
+        dout->phase[j] = r[j] > 0.0 ? (z[j].re * dz[j].im - z[j].im * dz[j].re) / r[j] / r[j] : 0.0;
+    }
+    for (size_t k = 0; k < N_FACET; ++k) {
+        const double ratio = facet_value(k, r);
+        if (ratio > leading) {
+            leading = ratio;
+            dout->trust_ratio = facet_value(k, dout->amplitude);
         }
     }
 }
@@ -172,11 +184,13 @@ void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_work
 
 double rom_trust_ratio(const rom_complex z[])
 {
-    double ratio = 0.0;
-    for (size_t j = 0; j < N_MODE; ++j) {
-        const double r = modulus(z[j]) / trained_amplitude[j];
-        if (!(r <= ratio)) /* a NaN must win */
-            ratio = r;
+    double r[N_MODE], ratio = 0.0;
+    for (size_t j = 0; j < N_MODE; ++j)
+        r[j] = modulus(z[j]);
+    for (size_t k = 0; k < N_FACET; ++k) {
+        const double value = facet_value(k, r);
+        if (!(value <= ratio)) /* a NaN must win */
+            ratio = value;
     }
     return ratio;
 }

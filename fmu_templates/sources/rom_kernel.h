@@ -49,7 +49,7 @@ typedef struct {
     double sensor[ROM_AT_LEAST_ONE(N_SENSOR_ROW)]; /* displacements in m, then velocities in m/s */
     double amplitude[N_MODE];                      /* |z_j| */
     double phase[N_MODE];                          /* arg z_j in rad, 0 at rest */
-    double trust_ratio;                            /* max_j |z_j| / trained_j */
+    double trust_ratio;                            /* max_k n_k . |z|, n_k the facets of the trained range */
 } rom_output;
 
 /* N zeta^E + G u, 1/s */

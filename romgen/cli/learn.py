@@ -10,7 +10,7 @@ import typer
 from romgen.cli.failures import reported
 from romgen.cli.options import Force, Json, Quiet, RunDir, StudyPath, open_study, run_folder
 from romgen.cli.output import Output
-from romgen.cli.run import bring_up_to_date, read_summary
+from romgen.cli.run import bring_up_to_date, read_summary, stability_line
 from romgen.fmu.model_file import model_json
 from romgen.pipeline import reduced_model
 from romgen.polar_form import polar_text
@@ -38,6 +38,7 @@ def learn(
     ]
     out.table(("trajectory", "role", "NMTE %"), rows)
     model = reduced_model(result)
+    out.text(stability_line(part))
     out.text(polar_text(model))
     if model_file is not None:
         replace_atomically(model_file, lambda path: _write(path, model_json(model)))

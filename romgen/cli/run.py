@@ -66,4 +66,19 @@ def _headlines(summary: dict[str, Any], out: Output) -> None:
             out.text(f"modes {first} and {second} are {pair['detuning_percent']:+.2f} % off {pair['ratio']}")
     for role, errors in summary["learn"]["nmte_percent"].items():
         out.text(f"NMTE {role}: " + ", ".join(f"{name} {value:.2f} %" for name, value in errors.items()))
+    out.text(stability_line(summary["learn"]))
     out.text(f"FMU against Python model: {summary['fmu']['native_vs_python_rel']:.1e} relative")
+
+
+def stability_line(part: dict[str, Any]) -> str:
+    """One line on the free decays from the trained range; ``part`` is "learn" of summary.json."""
+    tried = part["stability"]
+    if not tried["stable"]:
+        share = 100.0 * tried["decaying_share"][0]
+        return f"not stable in the trained range: {share:.0f} % of {tried['starts']} free motions from there decay"
+    reach = f", up to {tried['reach']:g} times of it" if tried["reach"] > 1.0 else ""
+    rate = tried["slowest_rate_per_s"][0] / tried["linear_rate_per_s"]
+    return (
+        f"stable: all {tried['starts']} free motions from the boundary of the trained range decay{reach}, "
+        f"at {100 * rate:.0f} % of the linear rate or more"
+    )

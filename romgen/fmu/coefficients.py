@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from romgen.arrays import ComplexArray
+from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
@@ -17,7 +17,7 @@ from romgen.fmu.tables import sensor_programme, table_hash
 from romgen.reduced_model import ReducedModel
 
 HARD_LIMIT = 3.0
-"""Default of the parameter hard_limit, in trained amplitudes."""
+"""Default of the parameter hard_limit, in distances of the trained range (``romgen.trained_range``)."""
 
 MAX_PRODUCTS = 60000
 """Monomials are numbered by 16-bit integers in the runtime."""
@@ -37,6 +37,7 @@ def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) 
             "",
             _array("rom_complex eigenvalue[N_MODE]", map(_complex, model.eigenvalues)),
             _array("double trained_amplitude[N_MODE]", map(_real, model.trained_amplitude)),
+            _array("double trained_facet[N_FACET][N_MODE]", map(_real_row, model.trained_range.facets)),
             _array("rom_complex input_matrix[ROM_AT_LEAST_ONE(N_INPUT)][N_MODE]", _input_rows(model.input_matrix)),
             _products("form", form_programme),
             _normal_form(model, form_programme),
@@ -64,6 +65,7 @@ def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], option
     chart = monomial_programme(fold_conjugates(model.chart).exponents)
     sizes = {
         "N_MODE": len(model.eigenvalues),
+        "N_FACET": len(model.trained_range.facets),
         "N_INPUT": len(model.inputs),
         "N_SENSOR": len(model.sensors),
         "ABSOLUTE_OUTPUTS": int(options.base_share is not None),
@@ -136,6 +138,10 @@ def _input_rows(matrix: ComplexArray) -> Sequence[str]:
 
 def _complex(value: complex) -> str:
     return f"{{{_real(value.real)}, {_real(value.imag)}}}"
+
+
+def _real_row(values: FloatArray) -> str:
+    return "{" + ", ".join(map(_real, values)) + "}"
 
 
 def _real(value: float) -> str:

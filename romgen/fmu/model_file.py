@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from romgen.fmu.programme import fold_conjugates
 from romgen.fmu.tables import TABLE_FILE, table_bytes, with_table
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
+from romgen.stability import Stability
 
 JSON_PATH, TABLE_PATH = "resources/rom.json", f"resources/{TABLE_FILE}"
 FORMAT = "romgen reduced model 1"
@@ -67,6 +69,8 @@ def _content(model: ReducedModel, table: str | None = None) -> dict[str, object]
         "input_matrix": _pairs(model.input_matrix),
         "internal_resonance": list(model.internal_resonance),
         "trained_amplitude": model.trained_amplitude.tolist(),
+        "trained_facets": model.trained_range.facets.tolist(),
+        "stability": None if model.stability is None else _stability_content(model.stability),
     }
 
 
@@ -132,6 +136,41 @@ def _model(content: dict[str, Any]) -> ReducedModel:
         input_matrix=_complex(content["input_matrix"], (m, n_input)),
         internal_resonance=tuple(content["internal_resonance"]),
         trained_amplitude=np.array(content["trained_amplitude"], dtype=np.float64),
+        trained_facets=_facets(content, m),
+        stability=_stability(content),
+    )
+
+
+def _facets(content: dict[str, Any], m: int) -> FloatArray | None:
+    """The facets of the trained range; None, the box of the amplitudes, for files written before there were any."""
+    if "trained_facets" not in content:
+        return None
+    facets: FloatArray = np.array(content["trained_facets"], dtype=np.float64).reshape(-1, m)
+    return facets
+
+
+def _stability_content(tried: Stability) -> dict[str, object]:
+    """JSON has no infinity: the rate of a motion that diverges is null."""
+    return {
+        "factor": tried.factor.tolist(),
+        "share": tried.share.tolist(),
+        "slowest_rate_per_s": [rate if math.isfinite(rate) else None for rate in tried.slowest_rate.tolist()],
+        "linear_rate_per_s": tried.linear_rate,
+        "starts": tried.starts,
+    }
+
+
+def _stability(content: dict[str, Any]) -> Stability | None:
+    """The decays that were tried; None where none were, or for files written before there was such a test."""
+    part = content.get("stability")
+    if part is None:
+        return None
+    return Stability(
+        factor=np.array(part["factor"], dtype=np.float64),
+        share=np.array(part["share"], dtype=np.float64),
+        slowest_rate=np.array([-math.inf if rate is None else rate for rate in part["slowest_rate_per_s"]]),
+        linear_rate=float(part["linear_rate_per_s"]),
+        starts=int(part["starts"]),
     )
 
 

@@ -92,7 +92,7 @@ class FmuReplay:
     t : (n_time,) s.
     state : (n_time, 2m) re z_1, im z_1, re z_2, ...
     displacement, velocity : (n_time, n_sensor) m and m/s.
-    trust_ratio : (n_time,) max_j |z_j| / trained_j.
+    trust_ratio : (n_time,) distance measure of the trained range, 1 on its boundary.
     """
 
     t: FloatArray = field(metadata={"unit": "s", "axes": "time"})

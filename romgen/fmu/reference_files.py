@@ -85,7 +85,7 @@ def _result(
     names = sensor_names(model)[:MAX_SENSORS]
     x, v = sensors(model, z)
     columns = [column for k in range(len(names)) for column in (x[:, k], v[:, k])]
-    ratio = np.max(np.abs(z) / model.trained_amplitude, axis=1)
+    ratio = model.trained_range.distance(z)
     header = ("time", *(name for pair in names for name in pair), "trust_ratio")
     missing = set(header) - shown - {"time"}
     if missing:

@@ -36,6 +36,7 @@ def exported_model(model: ReducedModel, sensors: tuple[str, ...] | None) -> Redu
         ("velocity", chosen.velocity.coefficients),
         ("input_matrix", chosen.input_matrix),
         ("trained_amplitude", chosen.trained_amplitude),
+        ("trained_facets", chosen.trained_range.facets if np.all(chosen.trained_amplitude > 0.0) else np.zeros(1)),
     ):
         if not np.all(np.isfinite(values)):
             raise InputError(f"{name} holds numbers that are not finite", where=WHERE, advice="learn the model again")

@@ -110,7 +110,7 @@ def _amplitudes(model: ReducedModel) -> list[Variable]:
             output(f"modal_phase_{j}", f"phase arg z_{j} of mode {j}, -pi to pi, 0 at rest", "rad", 1.0)
             for j in range(1, len(model.eigenvalues) + 1)
         ),
-        output("trust_ratio", "largest modal amplitude in units of the largest trained one", "1", 1.0, 0.0),
+        output("trust_ratio", "distance measure of the trained range: 1 on its boundary", "1", 1.0, 0.0),
     ]
 
 

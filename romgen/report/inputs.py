@@ -59,11 +59,15 @@ class StageCost:
 
 @dataclass(frozen=True)
 class OrderTrial:
-    """One polynomial order that was tried, its cross-validated error in percent, and whether the model has it."""
+    """One polynomial order that was tried, its cross-validated error in percent, and whether the model has it.
+
+    ``stable`` tells whether all free motions from the boundary of the trained range decay.
+    """
 
     order: int
     error_percent: float
     chosen: bool
+    stable: bool = True
 
 
 @dataclass(frozen=True)

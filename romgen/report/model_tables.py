@@ -8,6 +8,7 @@ from romgen.arrays import FloatArray, IntArray
 from romgen.reduced_model import ReducedModel
 from romgen.report.blocks import TableBlock
 from romgen.report.inputs import OrderTrial
+from romgen.stability import Stability
 
 _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -29,9 +30,23 @@ def spectrum_table(model: ReducedModel) -> TableBlock:
     header = ("mode", "Re λ [1/s]", "Im λ [1/s]", "frequency [Hz]", "damping ratio [%]", "trained |z| [1]")
     caption = (
         "Linear part and range of the reduced model. The trained |z| is the largest amplitude in the training motions; "
-        "beyond it the polynomials extrapolate."
+        "several modes are trained together up to the straight connections of what the motions reached."
     )
     return TableBlock(caption, header, rows)
+
+
+def stability_table(tried: Stability) -> TableBlock:
+    """Free motions from scaled boundaries of the trained range."""
+    rows = tuple(
+        (f"{factor:g}", f"{100 * share:.1f}", f"{rate:.3g}" if np.isfinite(rate) else "diverges")
+        for factor, share, rate in zip(tried.factor, tried.share, tried.slowest_rate, strict=True)
+    )
+    caption = (
+        f"Do free motions decay? {tried.starts} starts each on the boundary of the trained range (1) and beyond it, "
+        f"run over two time constants of the slowest mode, whose linear rate is {tried.linear_rate:.3g} 1/s. Beyond 1 "
+        "the model extrapolates: a share below 100 % there says how far it may be pushed."
+    )
+    return TableBlock(caption, ("distance of the start", "decaying [%]", "slowest mean decay rate [1/s]"), rows)
 
 
 def monomial_text(exponents: IntArray) -> str:
@@ -89,7 +104,7 @@ def order_table(orders: tuple[OrderTrial, ...]) -> TableBlock:
         (
             f"{trial.order}",
             f"{trial.error_percent:.3f}" if np.isfinite(trial.error_percent) else "no stable model",
-            "chosen" if trial.chosen else "",
+            ", ".join(("chosen",) * trial.chosen + ("not stable in its range",) * (not trial.stable)),
         )
         for trial in orders
     )

@@ -19,7 +19,7 @@ from romgen.report.history_figures import history_figure, history_table
 from romgen.report.inputs import ReportInputs
 from romgen.report.instantaneous_figures import instantaneous_figure, long_enough
 from romgen.report.mode_tables import frequency_table, ratio_table
-from romgen.report.model_tables import coefficient_table, order_table, spectrum_table
+from romgen.report.model_tables import coefficient_table, order_table, spectrum_table, stability_table
 from romgen.report.ringdown_figures import energy_figure, energy_table, nmte_table, ringdown_figure
 from romgen.report.spectrogram_figures import spectrogram_figure
 from romgen.report.structure_figures import mesh_figure, mode_figure
@@ -116,7 +116,9 @@ def model_section(inputs: ReportInputs) -> Section | None:
     if inputs.polar_form:
         polar = (ListingBlock("Normal form in polar coordinates, zⱼ = ρⱼ exp(iθⱼ).", inputs.polar_form),)
     coefficients = coefficient_table(inputs.model, inputs.coefficient_deviation)
-    blocks = (spectrum_table(inputs.model), *orders, *reason, *polar, coefficients)
+    tried = inputs.model.stability
+    stable: tuple[Block, ...] = () if tried is None else (stability_table(tried),)
+    blocks = (spectrum_table(inputs.model), *stable, *orders, *reason, *polar, coefficients)
     return Section("model", "Reduced model", blocks)
 
 

@@ -103,7 +103,7 @@ def test_points_beyond_training_are_flagged_and_the_branch_is_cut() -> None:
     np.testing.assert_array_equal(main.exceeds_trained_range, np.abs(main.q[:, 0]) > 0.2)
     assert main.exceeds_trained_range.any()
     assert "limit" in main.ends
-    assert any("beyond the trained amplitude" in note for note in response.notes)
+    assert any("outside the trained range" in note for note in response.notes)
     assert any("limit" in note for note in response.notes)
     # the far side of the resonance is reached from the other end of the range
     assert len(response.curves) == 2

@@ -10,11 +10,24 @@ import pytest
 
 import romgen.refinement as refinement
 from romgen.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from romgen.dissipation import demand
 from romgen.normal_form import resonance_table
 from romgen.output_map import displacement, output_map, slopes
 from romgen.polynomial import monomials, zeta
 from romgen.refined_chart import chart_terms, velocity_rows
-from romgen.refinement import RefinedDynamics, Segment, _cost, _linearise, _moved, _prior, refine, regrown, simulated
+from romgen.refinement import (
+    RefinedDynamics,
+    Segment,
+    _cost,
+    _prior,
+    growth,
+    linearise,
+    moved,
+    refine,
+    regrown,
+    simulated,
+)
+from romgen.trained_range import box_range
 
 LAMBDA = np.array([-2.0 + 60.0j, -3.0 + 121.0j])
 STARTS = (np.array([0.45, 0.05 + 0.02j]), np.array([0.1j, 0.4]))
@@ -60,16 +73,35 @@ def disturbed(model: RefinedDynamics, segments: Sequence[Segment]) -> tuple[Refi
 def test_gradient_matches_finite_differences(shots: int) -> None:
     truth = known()
     model, segments = disturbed(truth, data(truth, shots=shots))
-    here = _linearise(model, segments, MAX_STEP)
+    here = linearise(model, segments, MAX_STEP)
     assert here.model.cost == pytest.approx(_cost(model, segments, MAX_STEP), rel=1e-9)
     scale = np.sqrt(np.diag(here.hessian))
     for k in range(len(here.gradient)):
         step = np.zeros_like(here.gradient)
         step[k] = 1e-4 / scale[k]
-        ahead, behind = (_cost(*_moved(here.model, segments, sign * step), MAX_STEP) for sign in (1.0, -1.0))
+        ahead, behind = (_cost(*moved(here.model, segments, sign * step), MAX_STEP) for sign in (1.0, -1.0))
         # the output map and the rests are eliminated, which leaves the gradient exact; central difference
         slope = (ahead - behind) / (2.0 * step[k])
         assert 2.0 * here.gradient[k] == pytest.approx(slope, rel=1e-4, abs=1e-4 * scale[k] * here.model.cost**0.5)
+
+
+def test_gradient_with_missing_dissipation_matches_finite_differences() -> None:
+    """The states reach 0.5, where the coefficients of the test are ten times the linear damping."""
+    truth = known()
+    model, segments = disturbed(truth, data(truth))
+    model = replace(model, demand=demand(box_range(truth.amplitude), LAMBDA), B=4.0 * truth.B)
+    missing, half_gradient, _ = growth(model)
+    assert missing > 0.0
+    here = linearise(model, segments, MAX_STEP)
+    assert here.model.cost == pytest.approx(_cost(model, segments, MAX_STEP), rel=1e-9)
+    shared = len(half_gradient)
+    for k in range(shared):
+        step = np.zeros_like(here.gradient)
+        step[k] = 1e-4
+        ahead, behind = (growth(moved(model, segments, sign * step)[0])[0] for sign in (1.0, -1.0))
+        # the weights of the energy follow to 1e-3 of their logarithm, which their optimum forgives to second order
+        tolerance = 1e-3 * float(np.abs(half_gradient).max())
+        assert 2.0 * half_gradient[k] == pytest.approx((ahead - behind) / 2e-4, rel=1e-3, abs=tolerance)
 
 
 def test_known_normal_form_and_rest_positions_are_recovered(monkeypatch: pytest.MonkeyPatch) -> None:

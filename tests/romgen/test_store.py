@@ -186,3 +186,19 @@ def test_replacement_is_not_seen_before_it_is_complete(tmp_path: Path) -> None:
 
     replace_atomically(path, write)
     assert path.read_text() == "new"
+
+
+@dataclass(frozen=True)
+class Grown:
+    name: str
+    mass: float
+    colour: str | None = None
+
+
+def test_a_field_with_default_may_be_absent_from_an_older_file(tmp_path: Path) -> None:
+    path = tmp_path / "part.h5"
+    write_file(path, Grown("a", 1.0, "red"))
+    assert read_file(path, Grown).colour == "red"
+    with h5py.File(path, "a") as file:
+        del file["record/colour"]
+    assert read_file(path, Grown) == Grown("a", 1.0, None)

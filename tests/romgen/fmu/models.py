@@ -43,6 +43,7 @@ def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "r
         input_matrix=0.4 * _complex(rng, (2, n_input)),
         internal_resonance=(1, 2),
         trained_amplitude=np.array([1.0, 0.8]),
+        trained_facets=np.array([[1.0, 0.0], [0.7, 0.8], [0.0, 1.25]]),
     )
 
 

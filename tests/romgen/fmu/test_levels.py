@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import zipfile
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from romgen.fmu.records import FmuExport, FmuInfo, LevelRow
 from romgen.polynomial import evaluate, zeta
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
+from romgen.stability import tried_stability
 from tests.romgen.fmu.models import duffing_chain, random_model, random_states
 
 
@@ -108,8 +110,24 @@ def test_rom_json_gives_the_model_back(model: ReducedModel) -> None:
     np.testing.assert_array_equal(again.normal_form.coefficients, model.normal_form.coefficients)
     np.testing.assert_array_equal(again.velocity.coefficients, model.velocity.coefficients)
     assert (again.sensors, again.inputs) == (model.sensors, model.inputs)
+    np.testing.assert_array_equal(again.trained_range.facets, model.trained_range.facets)
     z = zeta(random_states(model, 20))
     expected = evaluate(model.chart, z).real
     np.testing.assert_allclose(evaluate(again.chart, z).real, expected, atol=1e-14 * np.abs(expected).max())
     with pytest.raises(InputError, match="not a reduced model"):
         model_from_json('{"format": "other"}')
+
+
+def test_rom_json_keeps_the_decays_and_reads_files_without_range(model: ReducedModel) -> None:
+    found = tried_stability(model.eigenvalues, model.normal_form, model.trained_range, (1.0,))
+    tried = dataclasses.replace(found, slowest_rate=np.array([-np.inf]))
+    text = model_json(dataclasses.replace(model, stability=tried))
+    again = model_from_json(text).stability
+    assert again is not None
+    np.testing.assert_array_equal(again.slowest_rate, tried.slowest_rate)
+    assert (again.starts, again.is_stable) == (tried.starts, tried.is_stable)
+    content = {key: value for key, value in json.loads(text).items() if key not in ("trained_facets", "stability")}
+    older = model_from_json(json.dumps(content))
+    assert older.stability is None
+    # the box of the amplitudes, as before there was a range
+    np.testing.assert_allclose(older.trained_range.facets, np.diag(1.0 / model.trained_amplitude))

@@ -37,10 +37,19 @@ def test_one_message_for_each_crossing(slave: Slave, model: ReducedModel) -> Non
     assert crossing == pytest.approx(H * inside.index(1), rel=1e-6)
 
 
-def test_trust_ratio_is_the_largest_relative_amplitude(slave: Slave, model: ReducedModel) -> None:
+def test_trust_ratio_is_the_distance_of_the_trained_range(slave: Slave, model: ReducedModel) -> None:
+    """The facets of the model: abs(z_1) <= 1, 0.7 abs(z_1) + 0.8 abs(z_2) <= 1, abs(z_2) <= 0.8."""
     fmu = slave.fmu
+    for states, expected in (
+        ([0.3, 0.4, 0.0, -0.6], 0.35 + 0.48),
+        ([0.6, -0.8, 0.0, 0.1], 1.0),
+        ([0.0, 0.1, 0.6, 0.0], 0.75),
+    ):
+        fmu.setReal(slave.references.states, states)
+        assert fmu.getReal([slave.references.trust_ratio])[0] == pytest.approx(expected, rel=1e-15)
+        z = np.array([[complex(*states[:2]), complex(*states[2:])]])
+        assert model.trained_range.distance(z)[0] == pytest.approx(expected, rel=1e-15)
     fmu.setReal(slave.references.states, [0.3, 0.4, 0.0, -0.6])
-    assert fmu.getReal([slave.references.trust_ratio])[0] == pytest.approx(0.6 / 0.8, rel=1e-15)
     amplitudes = [reference(model, f"modal_amplitude_{j}") for j in (1, 2)]
     np.testing.assert_allclose(fmu.getReal(amplitudes), [0.5, 0.6], rtol=1e-15)
 
