@@ -183,7 +183,8 @@ def _export(context: Context) -> dict[str, Any]:
 def _validation(context: Context) -> dict[str, Any]:
     validation = context.record("validation", Validation)
     check = validation.check
-    part = {
+    part: dict[str, Any] = {
+        "missed_checks": [f"{row.level}: {row.check}" for row in validation.levels.rows if not row.passed],
         "fmpy_problems": len(check.fmpy_problems) + len(check.pythonfmu_problems),
         "native_vs_python_rel": check.native_vs_python_rel,
         "replay_nmte_percent": {replay.name: replay.nmte_percent for replay in validation.replays},

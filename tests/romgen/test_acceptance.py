@@ -22,6 +22,7 @@ def summary(**changes: Any) -> dict[str, Any]:
         ],
         "fmu": {
             "fmpy_problems": changes.get("problems", 0),
+            "missed_checks": changes.get("checks", []),
             "native_vs_python_rel": changes.get("rel", 1e-12),
             "pythonfmu_vs_python_rel": changes.get("python_rel", 1e-12),
             "replay_nmte_percent": {"b": changes.get("replay", 4.9)},
@@ -36,7 +37,7 @@ def missed(**changes: Any) -> list[str]:
 
 def test_training_errors_are_not_judged() -> None:
     assert missed() == []
-    assert len(verdicts(summary(), LIMITS)) == 8
+    assert len(verdicts(summary(), LIMITS)) == 9
 
 
 def test_each_limit_can_be_missed() -> None:
@@ -45,6 +46,7 @@ def test_each_limit_can_be_missed() -> None:
     assert missed(nmte=5.1) == ["learn.nmte_percent.b"]
     assert missed(nmte=None) == ["learn.nmte_percent.b"]
     assert missed(problems=1) == ["fmu.fmpy_problems"]
+    assert missed(checks=["L2: serialised"]) == ["fmu.missed_checks"]
     assert missed(rel=2e-9) == ["fmu.native_vs_python_rel"]
     assert missed(ledger=0.6) == ["ringdowns.b energy imbalance %"]
     assert missed(forced=-10.1) == ["forced_validation.2 m/s^2 107.50 Hz amplitude error %"]
@@ -55,5 +57,5 @@ def test_each_limit_can_be_missed() -> None:
 
 def test_what_is_absent_or_undetermined_is_not_judged() -> None:
     assert verdicts(summary(absent=tuple(summary())), LIMITS) == ()
-    assert len(verdicts(summary(pair={"applied_force_n": None}), LIMITS)) == 7
+    assert len(verdicts(summary(pair={"applied_force_n": None}), LIMITS)) == 8
     assert not Verdict("x", math.nan, 1.0).passed

@@ -32,6 +32,7 @@ KEYS = {
     "fmu.path",
     "fmu.size_bytes",
     "fmu.fmpy_problems",
+    "fmu.missed_checks",
     "fmu.native_vs_python_rel",
     "fmu.pythonfmu_vs_python_rel",
     "stages.learn.wall_s",
