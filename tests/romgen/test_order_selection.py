@@ -11,9 +11,10 @@ from romgen.arrays import FloatArray
 from romgen.chart import ReducedTrajectory
 from romgen.learn import learn
 from romgen.learning_notes import learning_notes
-from romgen.order_selection import choose_order
+from romgen.order_selection import UNSTABLE, _improving, _Trial, choose_order
 from romgen.polynomial import PolynomialMap
 from romgen.settings import LearnSettings
+from romgen.stability import tried_stability
 from romgen.trajectory import Trajectory
 from romgen.trajectory_error import trajectory_error
 
@@ -85,3 +86,38 @@ def test_a_motion_that_comes_to_rest_elsewhere_is_noted() -> None:
     # relative to 0.51; the decay left at the end, exp(-1.8) of the start, averages out over ten periods to about 1 %
     assert abs(error.rest_percent - 100 * 0.01 / 0.51) < 0.2
     assert "'slipped' comes to rest" in learning_notes([motion], None, model, [error])[0]
+
+
+def test_a_model_that_gains_energy_in_its_range_is_noted() -> None:
+    model = learn([decay("one", 0.5, 0.2, 0.0)], [], SETTINGS.model_copy(update={"order": 3}), "cubic").model
+    assert model.stability is not None
+    assert model.stability.is_stable
+    E = model.normal_form.exponents
+    growth = PolynomialMap(E, 4e4 * (E == [2, 1]).all(axis=1).astype(complex)[None])
+    tried = tried_stability(model.eigenvalues, growth, model.trained_range)
+    notes = learning_notes([], None, replace(model, stability=tried), [])
+    assert len(notes) == 1
+    assert "not stable in its trained range: 100 % of 72 free motions" in notes[0]
+
+
+def test_a_start_outside_the_range_is_noted() -> None:
+    motion = decay("one", 0.5, 0.2, 0.0)
+    learned = learn([motion], [], SETTINGS.model_copy(update={"order": 3}), "cubic")
+    far = replace(learned.training[0], start=1.5 * learned.training[0].start)
+    distance = float(learned.model.trained_range.distance(far.start[None])[0])
+    notes = learning_notes([motion], None, learned.model, [far])
+    assert notes == (
+        f"trajectory 'one' starts at {distance:.2f} times the trained range: its error is that of an extrapolation",
+    )
+
+
+def test_a_stable_order_is_preferred_within_a_factor() -> None:
+    """The error of an order that is not stable counts UNSTABLE times."""
+    stable, lower = (
+        _Trial(3, "trajectories", np.array([1.5]), True),
+        _Trial(5, "trajectories", np.array([1.0]), False),
+    )
+    assert lower.score == UNSTABLE * lower.mean
+    assert _improving(iter([stable, lower]))[1] is stable
+    much_lower = replace(lower, errors=np.array([0.5]))
+    assert _improving(iter([stable, much_lower]))[1] is much_lower
