@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
-from romgen.compiled import compiled
+from romgen.compiled import compiled, compiled_unlocked
 
 # Taylor terms: 1/(20 + 3)! is below the rounding of doubles for abs(c) < 1.
 TAYLOR_TERMS = 20
@@ -114,7 +114,7 @@ def step(
     return z_next
 
 
-@compiled
+@compiled_unlocked
 def _march(
     t: FloatArray,
     z0: ComplexArray,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -161,7 +162,8 @@ def _trajectory_trials(
     fits = [growing_fits(training, kept, orders, options) for kept in folds]
     for order in orders:
         try:
-            grown = [next(fit) for fit in fits]
+            with ThreadPoolExecutor(FOLDS) as threads:
+                grown = list(threads.map(next, fits))
         except NumericalError:
             yield _Trial(order, "trajectories", np.zeros(0), False)
             return

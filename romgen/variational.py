@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
-from romgen.compiled import compiled
+from romgen.compiled import compiled, compiled_unlocked
 from romgen.etdrk4 import step_weights
 
 
@@ -73,7 +73,7 @@ def _combine(
     return out
 
 
-@compiled
+@compiled_unlocked
 def _march(
     t: FloatArray,
     z0: ComplexArray,

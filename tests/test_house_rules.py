@@ -32,7 +32,7 @@ def body_lines(function: ast.FunctionDef) -> int:
 
 def is_kernel(function: ast.FunctionDef) -> bool:
     """Compiled kernels take flat arrays instead of records."""
-    return bool({"compiled", "inlined", "threaded"} & marks(function))
+    return bool({"compiled", "compiled_unlocked", "inlined", "threaded"} & marks(function))
 
 
 def marks(function: ast.FunctionDef) -> set[str]:
