@@ -90,7 +90,7 @@ def solve_modes(
     order = np.argsort(values)
     shapes = shapes[:, order]
     shapes /= np.sqrt(np.einsum("nm,nm->m", shapes, mass @ shapes))
-    shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(count)])
+    shapes *= _signs(shapes)
     material = model.elastic_tangent(state.u, geometric=False)
     omega = np.sqrt(values[order])
     return ModalBasis(omega, np.ascontiguousarray(shapes), np.asarray(mass @ shapes), elastic, material)
@@ -128,3 +128,14 @@ def modal_stiffness(modes: ModalBasis) -> FloatArray:
 def damping_ratios(modes: ModalBasis, damping: Rayleigh) -> FloatArray:
     """zeta_j = (alpha + beta kappa_j) / (2 omega_j)."""
     return np.asarray((damping.alpha + damping.beta * modal_stiffness(modes)) / (2.0 * modes.omega))
+
+
+def _signs(shapes: FloatArray) -> FloatArray:
+    """Signs (n_mode,) that make the first of the largest entries of each shape positive.
+
+    Symmetric shapes have equal entries of both signs: within a thousandth they count as equal, or rounding would
+    choose, and with it the direction of a start along the shape.
+    """
+    magnitude = np.abs(shapes)
+    first = np.argmax(magnitude >= 0.999 * magnitude.max(axis=0), axis=0)
+    return np.asarray(np.sign(shapes[first, np.arange(shapes.shape[1])]))

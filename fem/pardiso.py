@@ -23,6 +23,9 @@ from fem.linear_solver import SolverStatistics
 # MKL's threads spin for 0.2 s after each call and take the cores from the other loops of a step: on two busy cores a
 # step of 22,000 unknowns took 30 to 280 ms, without spinning 29 ms. Read once, when MKL starts.
 os.environ.setdefault("KMP_BLOCKTIME", "0")
+# Sums in an order that does not depend on where memory lies: a killed run that goes on in a new process, and the same
+# run made twice, give the same bits (conditional numerical reproducibility of MKL, same machine and thread count).
+os.environ.setdefault("MKL_CBWR", "AUTO")
 
 _SPD, _UNSYMMETRIC = 2, 11
 _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1

@@ -8,7 +8,7 @@ import scipy.linalg as la
 
 from fem.errors import FemInputError
 from fem.linear_solver import available_solvers
-from fem.modes import damping_ratios, modal_stiffness, rayleigh, solve_modes
+from fem.modes import _signs, damping_ratios, modal_stiffness, rayleigh, solve_modes
 from fem.preload import StaticState
 from tests.fem.conftest import Strip
 from tests.fem.small_models import box, single
@@ -60,3 +60,11 @@ def test_free_body_is_refused() -> None:
     untouched = model.contact.evaluate(model.contact.relative(np.zeros((model.n_dof, 1))), model.contact.no_slip(1))
     with pytest.raises(FemInputError, match="nothing holds"):
         solve_modes(model, StaticState(np.zeros(model.n_dof), untouched, (), ()), 3, solver="superlu")
+
+
+def test_signs_do_not_hang_on_rounding() -> None:
+    """An antisymmetric shape: rounding makes one of two equal ends the largest, the first stays positive."""
+    shape = np.array([[0.2], [-1.0], [0.3], [1.0 + 1e-9]])
+    np.testing.assert_array_equal(_signs(shape), [-1.0])
+    np.testing.assert_array_equal(_signs(shape * (1.0 + np.array([[0.0], [3e-9], [0.0], [0.0]]))), [-1.0])
+    np.testing.assert_array_equal(_signs(np.array([[0.5], [-2.0]])), [-1.0])

@@ -47,6 +47,7 @@ def test_each_limit_can_be_missed() -> None:
     assert missed(nmte=None) == ["learn.nmte_percent.b"]
     assert missed(problems=1) == ["fmu.fmpy_problems"]
     assert missed(checks=["L2: serialised"]) == ["fmu.missed_checks"]
+    assert missed(checks=["L0: newest GNU C library"]) == []
     assert missed(rel=2e-9) == ["fmu.native_vs_python_rel"]
     assert missed(ledger=0.6) == ["ringdowns.b energy imbalance %"]
     assert missed(forced=-10.1) == ["forced_validation.2 m/s^2 107.50 Hz amplitude error %"]
