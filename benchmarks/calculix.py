@@ -101,7 +101,7 @@ def calculix(case: Case, folder: Path) -> Outcome:
     write_inp(folder / "model.inp", case.model)
     model = "*INCLUDE,INPUT=model.inp\n*NSET,NSET=sensors\n" + "".join(f"{n + 1},\n" for n in nodes)
     rest = nodal_loads(case.model.load)
-    static = "*STEP,NLGEOM,INC=1000\n*STATIC\n0.25,1.\n"
+    static = "*STEP,NLGEOM,INC=1000\n*STATIC\n1.,1.\n"
     output = "\n*NODE PRINT,NSET=sensors,FREQUENCY=1\nU\n*END STEP\n"
     modes = f"*STEP,PERTURBATION\n*FREQUENCY\n{case.modes}\n*END STEP\n"
     motion = f"*STEP,NLGEOM,AMPLITUDE=STEP,INC={case.steps}\n*DYNAMIC,DIRECT,ALPHA=0.\n"

@@ -47,7 +47,10 @@ class Pardiso:
         self._dtype: Any = np.float32 if single else np.float64
         self._handle = _Handle(load_mkl(), self._mtype)
         self._handle.iparm[27] = int(single)
-        if not symmetric:
+        if symmetric:
+            # Two-level factorisation: without it, MKL's reproducible mode solves one right-hand side on one thread.
+            self._handle.iparm[23] = 1
+        else:
             self._handle.iparm[[10, 12]] = 1, 1
         self._matrix = sp.csr_matrix((0, 0))
         self._seconds = {"analyse": 0.0, "factor": 0.0, "solve": 0.0}
