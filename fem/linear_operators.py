@@ -9,6 +9,7 @@ from numba import prange
 from fem.arrays import FloatArray, IntArray
 from fem.compiled import threaded_gather
 from fem.errors import FemInputError
+from fem.row_chunks import row_chunks
 
 
 class LinearOperators:
@@ -29,8 +30,9 @@ class LinearOperators:
         if rest.nnz and np.abs(rest.data).max() > 1e-12 * np.abs(scalar.data).max():
             raise FemInputError("mass must act alike in all directions", where="linear operators")
         blocks = stiffness.tobsr((3, 3))
-        self._mass = (scalar.indptr, scalar.indices, scalar.data)
-        self._stiffness = (blocks.indptr, blocks.indices, np.ascontiguousarray(blocks.data))
+        self._mass = (row_chunks(scalar.indptr), scalar.indptr, scalar.indices, scalar.data)
+        entries = np.ascontiguousarray(blocks.data)
+        self._stiffness = (row_chunks(blocks.indptr), blocks.indptr, blocks.indices, entries)
 
     def stiffness(self, x: FloatArray) -> FloatArray:
         """K x (n_dof, n_case)."""
@@ -48,54 +50,66 @@ class LinearOperators:
 
 
 @threaded_gather
-def _scalars_one(pointers: IntArray, columns: IntArray, mass: FloatArray, x: FloatArray, out: FloatArray) -> None:
+def _scalars_one(
+    chunks: IntArray, pointers: IntArray, columns: IntArray, mass: FloatArray, x: FloatArray, out: FloatArray
+) -> None:
     """One case: sums stay in registers."""
-    for node in prange(len(pointers) - 1):
-        p, q, r = 0.0, 0.0, 0.0
-        for k in range(pointers[node], pointers[node + 1]):
-            j = 3 * columns[k]
-            p += mass[k] * x[j, 0]
-            q += mass[k] * x[j + 1, 0]
-            r += mass[k] * x[j + 2, 0]
-        out[3 * node, 0], out[3 * node + 1, 0], out[3 * node + 2, 0] = p, q, r
+    for chunk in prange(len(chunks) - 1):
+        for node in range(chunks[chunk], chunks[chunk + 1]):
+            p, q, r = 0.0, 0.0, 0.0
+            for k in range(pointers[node], pointers[node + 1]):
+                j = 3 * columns[k]
+                p += mass[k] * x[j, 0]
+                q += mass[k] * x[j + 1, 0]
+                r += mass[k] * x[j + 2, 0]
+            out[3 * node, 0], out[3 * node + 1, 0], out[3 * node + 2, 0] = p, q, r
 
 
 @threaded_gather
-def _blocks_one(pointers: IntArray, columns: IntArray, blocks: FloatArray, x: FloatArray, out: FloatArray) -> None:
+def _blocks_one(
+    chunks: IntArray, pointers: IntArray, columns: IntArray, blocks: FloatArray, x: FloatArray, out: FloatArray
+) -> None:
     """One case: sums stay in registers."""
-    for node in prange(len(pointers) - 1):
-        p, q, r = 0.0, 0.0, 0.0
-        for k in range(pointers[node], pointers[node + 1]):
-            j = 3 * columns[k]
-            x0, x1, x2 = x[j, 0], x[j + 1, 0], x[j + 2, 0]
-            p += blocks[k, 0, 0] * x0 + blocks[k, 0, 1] * x1 + blocks[k, 0, 2] * x2
-            q += blocks[k, 1, 0] * x0 + blocks[k, 1, 1] * x1 + blocks[k, 1, 2] * x2
-            r += blocks[k, 2, 0] * x0 + blocks[k, 2, 1] * x1 + blocks[k, 2, 2] * x2
-        out[3 * node, 0], out[3 * node + 1, 0], out[3 * node + 2, 0] = p, q, r
+    for chunk in prange(len(chunks) - 1):
+        for node in range(chunks[chunk], chunks[chunk + 1]):
+            p, q, r = 0.0, 0.0, 0.0
+            for k in range(pointers[node], pointers[node + 1]):
+                j = 3 * columns[k]
+                x0, x1, x2 = x[j, 0], x[j + 1, 0], x[j + 2, 0]
+                p += blocks[k, 0, 0] * x0 + blocks[k, 0, 1] * x1 + blocks[k, 0, 2] * x2
+                q += blocks[k, 1, 0] * x0 + blocks[k, 1, 1] * x1 + blocks[k, 1, 2] * x2
+                r += blocks[k, 2, 0] * x0 + blocks[k, 2, 1] * x1 + blocks[k, 2, 2] * x2
+            out[3 * node, 0], out[3 * node + 1, 0], out[3 * node + 2, 0] = p, q, r
 
 
 @threaded_gather
-def _scalars(pointers: IntArray, columns: IntArray, mass: FloatArray, x: FloatArray, out: FloatArray) -> None:
+def _scalars(
+    chunks: IntArray, pointers: IntArray, columns: IntArray, mass: FloatArray, x: FloatArray, out: FloatArray
+) -> None:
     """Several cases: the innermost loop runs over them."""
     n_case = x.shape[1]
-    for node in prange(len(pointers) - 1):
-        out[3 * node : 3 * node + 3] = 0.0
-        for k in range(pointers[node], pointers[node + 1]):
-            m, j = mass[k], 3 * columns[k]
-            for i in range(3):
-                for c in range(n_case):
-                    out[3 * node + i, c] += m * x[j + i, c]
+    for chunk in prange(len(chunks) - 1):
+        for node in range(chunks[chunk], chunks[chunk + 1]):
+            out[3 * node : 3 * node + 3] = 0.0
+            for k in range(pointers[node], pointers[node + 1]):
+                m, j = mass[k], 3 * columns[k]
+                for i in range(3):
+                    for c in range(n_case):
+                        out[3 * node + i, c] += m * x[j + i, c]
 
 
 @threaded_gather
-def _blocks(pointers: IntArray, columns: IntArray, blocks: FloatArray, x: FloatArray, out: FloatArray) -> None:
+def _blocks(
+    chunks: IntArray, pointers: IntArray, columns: IntArray, blocks: FloatArray, x: FloatArray, out: FloatArray
+) -> None:
     """Several cases: the innermost loop runs over them."""
     n_case = x.shape[1]
-    for node in prange(len(pointers) - 1):
-        out[3 * node : 3 * node + 3] = 0.0
-        for k in range(pointers[node], pointers[node + 1]):
-            j = 3 * columns[k]
-            for i in range(3):
-                a, b, d = blocks[k, i, 0], blocks[k, i, 1], blocks[k, i, 2]
-                for c in range(n_case):
-                    out[3 * node + i, c] += a * x[j, c] + b * x[j + 1, c] + d * x[j + 2, c]
+    for chunk in prange(len(chunks) - 1):
+        for node in range(chunks[chunk], chunks[chunk + 1]):
+            out[3 * node : 3 * node + 3] = 0.0
+            for k in range(pointers[node], pointers[node + 1]):
+                j = 3 * columns[k]
+                for i in range(3):
+                    a, b, d = blocks[k, i, 0], blocks[k, i, 1], blocks[k, i, 2]
+                    for c in range(n_case):
+                        out[3 * node + i, c] += a * x[j, c] + b * x[j + 1, c] + d * x[j + 2, c]

@@ -198,7 +198,8 @@ class Transient:
         count = self.settings.corrected_modes if self.settings.dispersion_correction and not adaptive else 0
         h = self.settings.time_step
         ratios = [self.scheme.frequency_corrected_inertia(float(omega), h) for omega in modes.omega[:count]]
-        return modes.left[:, :count], np.array(ratios)
+        # Column by column: two products with it stand in every iteration.
+        return np.asfortranarray(modes.left[:, :count]), np.array(ratios)
 
     def _equation(self, level: int) -> StepEquation:
         """The equation of steps of ``time_step`` / 2^level."""

@@ -11,7 +11,6 @@ import scipy.sparse as sp
 
 from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import SYMMETRIC_ONLY, available_solvers, make_solver
-from fem.sparse_product import SparseProduct
 from tests.fem.small_models import clamped_strip
 
 SOLVERS = available_solvers()
@@ -104,13 +103,6 @@ def test_unknown_solver_lists_the_available_ones() -> None:
     with pytest.raises(FemInputError, match="superlu"):
         make_solver("umfpack", symmetric=True)
     assert make_solver(symmetric=True).name == SOLVERS[0]
-
-
-def test_threaded_product_equals_scipy() -> None:
-    matrix = _matrix(skew=0.3)
-    x = np.random.default_rng(3).standard_normal((matrix.shape[0], 4))
-    # Five to seven terms per row: a few units in the last place.
-    np.testing.assert_allclose(SparseProduct(matrix)(x), matrix @ x, atol=1e-14)
 
 
 def test_mkl_that_does_not_load_gives_way(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
