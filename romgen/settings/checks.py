@@ -26,7 +26,8 @@ SAME_MIX = np.cos(np.deg2rad(1.0))
 
 def study_problems(study: Study) -> tuple[str, ...]:
     """Return one line per thing that the study names but does not have, or contradicts."""
-    checks = (_data_problems(study.data),) if study.data is not None else _model_checks(study)
+    data = study.data
+    checks = _model_checks(study) if data is None else (_data_problems(data), _forcing_problems(study, data.sensors))
     problems = [problem for check in checks for problem in check]
     return (*problems, *_learn_problems(study), *_downstream_problems(study))
 
@@ -204,6 +205,30 @@ def _data_problems(data: DataSettings) -> Iterator[str]:
         yield f"[data] validation overlaps training; got {', '.join(map(str, sorted(both, key=str)))} in both"
     if len(set(data.sensors)) < len(data.sensors):
         yield f"[data] sensors must differ; got {', '.join(data.sensors)}"
+
+
+def _forcing_problems(study: Study, sensors: tuple[str, ...]) -> Iterator[str]:
+    count = len(study.learn.master_modes)
+    for name, table in study.forcing.items():
+        where = f"[forcing.{name}]"
+        if not _IDENTIFIER.fullmatch(name):
+            yield f"{where} the name becomes a variable of the FMU: letters, digits and underscores; got '{name}'"
+        if name in sensors:
+            yield f"{where} the name is taken by a sensor; choose another"
+        if any(mode > count for mode in table.modes):
+            yield f"{where} modes are numbered from 1 to the {count} of [learn] master_modes; got {list(table.modes)}"
+        for k, point in enumerate(table.points, 1):
+            if point.sensor not in sensors:
+                yield unknown(f"{where} sensor of point {k}:", "sensor", point.sensor, sensors)
+            if point.mode is not None and point.mode > count:
+                yield f"{where} mode of point {k}: [learn] master_modes has {count} modes; got {point.mode}"
+        for sensor, shares in table.participation.items():
+            if sensor not in sensors:
+                yield unknown(f"{where} participation:", "sensor", sensor, sensors)
+            if len(shares) != count:
+                yield f"{where} participation of {sensor}: one number per master mode ({count}); got {len(shares)}"
+        if table.participation and not any(any(shares) for shares in table.participation.values()):
+            yield f"{where} participation is zero for all modes: the input would drive nothing"
 
 
 def _learn_problems(study: Study) -> Iterator[str]:

@@ -1,0 +1,90 @@
+"""What a user should know about a load input that was not computed, one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from romgen.arrays import FloatArray
+from romgen.load_fit import AMPLITUDE_ERROR, FREQUENCY_ERROR, LEVEL_ERROR, LoadFit
+from romgen.reduced_model import ReducedModel
+
+# Deviations of more than two expected ones are a conflict, not noise.
+CONFLICT = 2.0
+# Shapes of another model that differ by more belong to other modes or sensors.
+OTHER_SHAPE_PERCENT = 10.0
+
+
+def calibration_notes(model: ReducedModel, name: str, fit: LoadFit, sign: int) -> tuple[str, ...]:
+    """Return what was calibrated from which points, what was assumed, and what the points say against the model."""
+    return (
+        _source(name, fit),
+        *_unloaded(model, name, fit),
+        _sign(model, name, fit, sign),
+        *fit.notes,
+        *_points(model, fit),
+    )
+
+
+def participation_notes(
+    model: ReducedModel, name: str, f: FloatArray, given: tuple[FloatArray, FloatArray]
+) -> tuple[str, ...]:
+    """Return that the load was given, and where several sensors contradict the shapes of the data.
+
+    Parameters
+    ----------
+    f : (m,) modal load.
+    given : Phi (n_row, m) of the sensors that were given, and their accelerations (n_row, m).
+    """
+    shapes, shares = given
+    notes = [f"the load of input {name} was given by participation, not computed or measured"]
+    missed = 100.0 * np.linalg.norm(shares - shapes * f, axis=0)
+    size = np.linalg.norm(shares, axis=0)
+    notes += [
+        f"the participation of mode {j + 1} fits its shape in the data to {missed[j] / size[j]:.0f} % only: are "
+        "sensors, modes and signs those of the data?"
+        for j in range(model.eigenvalues.size)
+        if missed[j] > OTHER_SHAPE_PERCENT * size[j]
+    ]
+    return tuple(notes)
+
+
+def _source(name: str, fit: LoadFit) -> str:
+    n = len(fit.needed)
+    loads = ", ".join(f"{d:.1f} % on mode {j + 1}" for j, d in enumerate(fit.deviation_percent) if np.isfinite(d))
+    base = f"the load of input {name} is not computed but calibrated on {n} measured point{'s' * (n > 1)}"
+    if np.isnan(fit.spread_percent):
+        return f"{base}, and nothing is left to check it by; if these err as expected its standard deviation is {loads}"
+    return f"{base}, which spread by {fit.spread_percent:.1f} % in level; standard deviation of the load {loads}"
+
+
+def _unloaded(model: ReducedModel, name: str, fit: LoadFit) -> Iterator[str]:
+    rest = [str(j + 1) for j in range(model.eigenvalues.size) if np.isnan(fit.deviation_percent[j])]
+    if rest:
+        yield f"input {name} is taken not to drive mode {', '.join(rest)}: no measured point says how much it does"
+
+
+def _sign(model: ReducedModel, name: str, fit: LoadFit, sign: int) -> str:
+    sensor = model.sensors[fit.paths[0].point.sensor]
+    way = "along" if sign > 0 else "against"
+    return f"amplitudes do not show a sign: {sensor} is taken to accelerate {way} a positive {name} (key sign)"
+
+
+def _points(model: ReducedModel, fit: LoadFit) -> Iterator[str]:
+    for path, at, expected in zip(fit.paths, fit.needed, fit.expected_percent, strict=True):
+        point = path.point
+        off = 100.0 * np.log(at.level / point.level)
+        if abs(off) > CONFLICT * expected:
+            yield (
+                f"{point.name}: the model needs {at.level:.4g} instead of {point.level:.4g}; errors of "
+                f"{100 * AMPLITUDE_ERROR:g} % in amplitude, {100 * LEVEL_ERROR:g} % in level and "
+                f"{100 * FREQUENCY_ERROR:g} % in frequency explain {expected:.1f} %"
+            )
+        distance = float(model.trained_range.distance(at.q[None])[0])
+        if distance > 1.0:
+            yield f"{point.name}: its amplitude lies outside the trained range, {distance:.2f} times its boundary"
+        if not at.stable:
+            yield f"{point.name}: the model is not stable there, a sweep would jump; its frequency may be off"
+        if at.crossings > 1:
+            yield f"{point.name}: the model shows this amplitude at {at.crossings} levels; the first from rest is taken"
