@@ -210,7 +210,8 @@ def _from_participation(
             advice="give a sensor that moves with it, or 0",
         )
     square = np.sum(shapes[rows] ** 2, axis=0)
-    f = np.where(seen, np.sum(shapes[rows] * shares, axis=0) / square, 0.0)
+    push = np.sum(shapes[rows] * shares, axis=0)
+    f = np.divide(push, square, out=np.zeros_like(push), where=seen)
     notes = participation_notes(model, name, f, (shapes[rows], shares))
     unknown = np.full(f.size, np.nan)
     return InputLoad(name, unit, "participation", f, unknown, float("nan"), (), notes)

@@ -19,7 +19,7 @@ from romgen.forced_response import LIMIT, forced_system
 from romgen.lifted_orbit import SAMPLES, Measure, orbit_amplitudes
 from romgen.reduced_model import ReducedModel
 
-# The branch starts at this share of the load that the linear model needs: almost linear, and well below the target.
+# The branch starts at this share of what the linear model needs (of the trained amplitude at most): almost linear.
 FIRST_SHARE = 0.1
 # The branch is followed to this multiple of the modal amplitude that the linear model has at the measured one.
 AHEAD = 2.0
@@ -244,15 +244,16 @@ def load_path(model: ReducedModel, column: ComplexArray, point: MeasuredPoint) -
     trained, linear = float(np.max(model.trained_amplitude)), system.loaded(1.0).linear_response(system.omega)
     small = SMALL * trained / float(np.max(np.abs(linear)))
     needed = small * point.amplitude / _linear_amplitude(system, small, point)
-    first = FIRST_SHARE * needed
+    reached = float(np.max(np.abs(linear))) * needed
+    share = FIRST_SHARE * min(1.0, trained / reached)
+    first = share * needed
     start = system.loaded(first)
     x0 = np.append(start.start(start.linear_response(system.omega), system.omega), 0.0)
-    reached = float(np.max(np.abs(linear))) * needed
     settings = ContinuationSettings(
         parameter_range=(first, float("inf")),
         state_scale=trained,
         parameter_scale=needed * trained / reached,
-        first_step=min(0.02, FIRST_SHARE * reached / trained),
+        first_step=min(0.02, share * reached / trained),
         state_limit=min(AHEAD * reached, LIMIT * trained),
     )
     path = _followed(system, x0, first, settings, point)

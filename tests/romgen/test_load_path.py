@@ -30,7 +30,8 @@ def measured(
 def closed_form(rho: FloatArray, omega: float) -> tuple[FloatArray, FloatArray]:
     """Level and amplitude of z' = lambda z + gamma z^2 conj z - i u / 2.
 
-    abs(f) = rho abs(lambda - i Omega + gamma rho^2). With z = q e^{i phi} + f / (-i Omega - lambda) e^{-i phi} the sensor 2 Re z has the amplitude 2 abs(q + conj(b)).
+    abs(f) = rho abs(lambda - i Omega + gamma rho^2). With z = q e^{i phi} + b e^{-i phi}, b = f / (-i Omega - lambda),
+    the sensor 2 Re z has the amplitude 2 abs(q + conj(b)).
     """
     model = averaged_oscillator(GAMMA, DAMPING)
     n = model.eigenvalues[0] - 1j * omega + GAMMA * rho**2
