@@ -67,6 +67,7 @@ def _point(point: CalibratedPoint) -> dict[str, Any]:
         "level",
         "frequency_hz",
         "peak",
+        "resonance_hz",
         "sensor",
         "measure",
         "measured_m",

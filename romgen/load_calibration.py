@@ -33,8 +33,9 @@ class CalibratedPoint:
     Attributes
     ----------
     level, unit : amplitude of the cosine on the input.
-    frequency_hz : of the point; of the model's phase resonance where ``peak``.
-    peak : the point was given without frequency.
+    frequency_hz : of the point; of the model where a peak was given without.
+    peak : the point is the peak of the response.
+    resonance_hz : phase resonance of the model at the same amplitude; nan where it has none.
     sensor, measure, measured_m : what was measured.
     model_m : the model under the same level, nearest to the measurement; nan where it has no such state.
     level_needed : level at which the model shows ``measured_m``.
@@ -50,6 +51,7 @@ class CalibratedPoint:
     unit: str
     frequency_hz: float
     peak: bool
+    resonance_hz: float
     sensor: str
     measure: Measure
     measured_m: float
@@ -168,17 +170,20 @@ def _measured(model: ReducedModel, name: str, point: ForcedPointSettings, measur
     if point.frequency_hz is not None:
         mode = int(np.argmin(np.abs(model.eigenvalues.imag - 2.0 * np.pi * point.frequency_hz)))
     sensor = model.sensors.index(point.sensor)
-    return MeasuredPoint(name, point.level, point.frequency_hz, sensor, point.measure or measure, point.amplitude, mode)
+    peak = point.peak or point.frequency_hz is None
+    shown = point.measure or measure
+    return MeasuredPoint(name, point.level, point.frequency_hz, sensor, shown, point.amplitude, mode, peak)
 
 
 def _calibrated(model: ReducedModel, unit: str, fit: LoadFit, k: int) -> CalibratedPoint:
-    path, at = fit.paths[k], fit.needed[k]
+    path, at, resonance = fit.paths[k], fit.needed[k], fit.resonances[k]
     point = path.point
     return CalibratedPoint(
         level=point.level,
         unit=unit,
-        frequency_hz=at.frequency_hz,
-        peak=point.frequency_hz is None,
+        frequency_hz=at.frequency_hz if point.frequency_hz is None else point.frequency_hz,
+        peak=point.peak,
+        resonance_hz=float("nan") if resonance is None else resonance.frequency_hz,
         sensor=model.sensors[point.sensor],
         measure=point.measure,
         measured_m=point.amplitude,

@@ -13,14 +13,14 @@ the load is known well there, but never better than the level itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from romgen.arrays import FloatArray
-from romgen.errors import InputError
+from romgen.errors import InputError, NumericalError
 from romgen.forcing import chart_input_matrix, sensor_shapes
 from romgen.load_path import LoadAtAmplitude, LoadPath, MeasuredPoint, load_path
 from romgen.reduced_model import ReducedModel
@@ -71,6 +71,7 @@ class LoadFit:
     deviation_percent : (m,) its standard deviation; nan where no load was fitted.
     spread_percent : weighted standard deviation of the r_i, nan where nothing is left to judge it by.
     paths, needed : branch and solution of every point under f.
+    resonances : the same amplitude in phase resonance; None where the model has none.
     expected_percent : (n_point,) 100 sigma.
     notes : what the points leave open.
     """
@@ -80,6 +81,7 @@ class LoadFit:
     spread_percent: float
     paths: tuple[LoadPath, ...]
     needed: tuple[LoadAtAmplitude, ...]
+    resonances: tuple[LoadAtAmplitude | None, ...]
     expected_percent: FloatArray = field(metadata={"unit": "percent", "axes": "point"})
     notes: tuple[str, ...]
 
@@ -109,7 +111,27 @@ def fit_load(problem: LoadProblem, sign: float) -> LoadFit:
     for j in problem.loaded:
         if not deviation[j] < HARDLY:
             notes += (f"the points hardly determine the load on mode {j + 1}: deviation {deviation[j]:.0f} %",)
-    return LoadFit(f, deviation, _spread(problem, r, sigma), tuple(paths), tuple(needed), 100.0 * sigma, notes)
+    return LoadFit(
+        modal_load=f,
+        deviation_percent=deviation,
+        spread_percent=_spread(problem, r, sigma),
+        paths=tuple(paths),
+        needed=tuple(needed),
+        resonances=tuple(_resonance(path, at) for path, at in zip(paths, needed, strict=True)),
+        expected_percent=100.0 * sigma,
+        notes=notes,
+    )
+
+
+def _resonance(path: LoadPath, at: LoadAtAmplitude) -> LoadAtAmplitude | None:
+    """Return the solution of the same amplitude in phase resonance."""
+    if path.point.peak:
+        return at
+    peak = replace(path.point, peak=True)
+    try:
+        return load_path(path.system.model, path.system.column, peak).crossing()
+    except (InputError, NumericalError):  # an answer off resonance need not have a peak of the same amplitude
+        return None
 
 
 def _start(problem: LoadProblem) -> tuple[FloatArray, FloatArray]:

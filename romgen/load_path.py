@@ -19,7 +19,7 @@ from romgen.forced_response import LIMIT, forced_system
 from romgen.lifted_orbit import SAMPLES, Measure, orbit_amplitudes
 from romgen.reduced_model import ReducedModel
 
-# The branch starts at this share of what the linear model needs (of the trained amplitude at most): almost linear.
+# A resonance is followed from this share of what the linear model needs (of the trained amplitude at most).
 FIRST_SHARE = 0.1
 # The branch is followed to this multiple of the modal amplitude that the linear model has at the measured one.
 AHEAD = 2.0
@@ -40,7 +40,8 @@ class MeasuredPoint:
     ----------
     name : how messages call it.
     level : amplitude of the cosine on the input, in its unit.
-    frequency_hz : forcing frequency; None at the peak of the response, taken as phase resonance.
+    frequency_hz : forcing frequency; of a peak what was measured, or None.
+    peak : it is the peak of the response, which is taken as phase resonance at the frequency of the model.
     sensor : row of the sensor maps; measure, amplitude : what it showed, m.
     mode : index of the mode that is driven near resonance.
     """
@@ -52,6 +53,7 @@ class MeasuredPoint:
     measure: Measure
     amplitude: float
     mode: int
+    peak: bool = False
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class LoadAtAmplitude:
     Attributes
     ----------
     level : load, in the unit of the input.
-    frequency_hz : of the point, or of the phase resonance.
+    frequency_hz : of the solution.
     q : (m,) modal amplitudes.
     by_amplitude, by_frequency : d ln level / d ln amplitude and d ln level / d ln frequency (0 at a resonance).
     stable : whether a sweep would stay there.
@@ -245,8 +247,10 @@ def load_path(model: ReducedModel, column: ComplexArray, point: MeasuredPoint) -
     small = SMALL * trained / float(np.max(np.abs(linear)))
     needed = small * point.amplitude / _linear_amplitude(system, small, point)
     reached = float(np.max(np.abs(linear))) * needed
+    # A resonance is not defined at rest; a fixed frequency is followed from there, since past a fold far from the
+    # linear resonance less load is needed than on the way to it.
     share = FIRST_SHARE * min(1.0, trained / reached)
-    first = share * needed
+    first = share * needed if point.peak else 0.0
     start = system.loaded(first)
     x0 = np.append(start.start(start.linear_response(system.omega), system.omega), 0.0)
     settings = ContinuationSettings(
@@ -275,13 +279,15 @@ def _followed(
 
 def _load_system(model: ReducedModel, column: ComplexArray, point: MeasuredPoint) -> LoadSystem:
     eigenvalue = model.eigenvalues[point.mode]
-    omega = float(eigenvalue.imag) if point.frequency_hz is None else 2.0 * np.pi * point.frequency_hz
+    if point.frequency_hz is None and not point.peak:
+        raise InputError("a point that is no peak needs a frequency", where=point.name)
+    omega = float(eigenvalue.imag) if point.peak else 2.0 * np.pi * float(point.frequency_hz or 0.0)
     unit = 0.5 * column
     still = forced_system(model, np.zeros_like(unit), point.mode)
     rest = still.start(np.zeros_like(unit), omega)
     push = forced_system(model, unit, point.mode).linearise(rest, omega)[0]
     phase: FloatArray | None = None
-    if point.frequency_hz is None:
+    if point.peak:
         direction = unit[point.mode].conjugate() / abs(unit[point.mode])
         phase = np.asarray((direction * still.modal(np.eye(rest.size))[:, point.mode]).imag)
     # w counts as a state: the branch ends where the resonance has moved by its whole frequency

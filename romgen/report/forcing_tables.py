@@ -36,6 +36,7 @@ def calibration_table(load: InputLoad) -> TableBlock:
     header = (
         "level",
         "frequency [Hz]",
+        "model resonates at [Hz]",
         "mode",
         "sensor",
         "measured [mm]",
@@ -64,6 +65,7 @@ def _row(point: CalibratedPoint) -> tuple[str, ...]:
     return (
         f"{point.level:g} {unit_text(point.unit)}",
         f"{point.frequency_hz:.3f}",
+        f"{point.resonance_hz:.3f}" if np.isfinite(point.resonance_hz) else "-",
         f"{point.mode}",
         f"{point.sensor}, {MEASURE_NAMES[point.measure]}",
         f"{1e3 * point.measured_m:.4f}",

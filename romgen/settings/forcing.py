@@ -12,13 +12,14 @@ from romgen.settings.base import PositiveFrequency, PositiveLength, Settings
 class ForcedPointSettings(Settings):
     """Entry of [forcing.<name>] points: the steady answer of one sensor to ``level`` cos(2 pi frequency_hz t).
 
-    Without a frequency it is the peak of the frequency response at that level.
+    With ``peak``, or without a frequency, it is the peak of the frequency response at that level.
     """
 
     level: float = Field(gt=0.0)
     sensor: str
     amplitude: PositiveLength
     frequency_hz: PositiveFrequency | None = None
+    peak: bool = False
     measure: Literal["max", "sqrt2_rms"] | None = None
     mode: int | None = Field(default=None, ge=1)
 

