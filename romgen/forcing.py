@@ -11,7 +11,7 @@ import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
-from romgen.polynomial import PolynomialMap
+from romgen.polynomial import PolynomialMap, jacobian, zeta
 from romgen.reduced_model import ReducedModel
 
 
@@ -76,6 +76,34 @@ def with_inputs(
 ) -> ReducedModel:
     """Return the model with load inputs, modal_load (m, n_input) as in ``chart_input_matrix``."""
     return replace(model, inputs=inputs, input_units=units, input_matrix=chart_input_matrix(model, modal_load))
+
+
+def input_at_states(model: ReducedModel, z: ComplexArray, column: ComplexArray) -> ComplexArray:
+    """Return how one input acts on z at states z (n, m): the exact counterpart of the constant G of the model.
+
+    A load changes eta' alone: w = y / s has w' = ... + 2 Re(V G) u, V of the linear chart, and w = Re(T zeta^E) gives
+
+        [dw/dz, dw/dconj(z)] (G(z), conj G(z)) = 2 Re(V G).
+
+    The model keeps G(0) = G: the leading order in the amplitude.
+
+    Parameters
+    ----------
+    column : (m,) G of the input.
+
+    Returns
+    -------
+    (n, m) complex, 1/s per input unit.
+    """
+    m = z.shape[1]
+
+    def slopes(at: ComplexArray) -> ComplexArray:
+        T = jacobian(model.chart, zeta(at))
+        return np.asarray(0.5 * (T + np.concatenate([T[..., m:], T[..., :m]], axis=-1).conj()))
+
+    push = slopes(np.zeros((1, m), dtype=np.complex128))[0] @ np.concatenate([column, column.conj()])
+    sides = np.broadcast_to(push[:, None], (len(z), 2 * m, 1))
+    return np.asarray(np.linalg.solve(slopes(z), sides)[:, :m, 0])
 
 
 def sensor_shapes(model: ReducedModel) -> FloatArray:

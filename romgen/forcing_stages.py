@@ -75,6 +75,7 @@ def _point(point: CalibratedPoint) -> dict[str, Any]:
         "level_needed",
         "deviation_percent",
         "expected_percent",
+        "input_change_percent",
         "mode",
         "distance",
         "stable",

@@ -18,7 +18,7 @@ from romgen.forcing import sensor_shapes, with_inputs
 from romgen.lifted_orbit import Measure
 from romgen.load_fit import LoadFit, LoadProblem, fit_load
 from romgen.load_notes import calibration_notes, participation_notes
-from romgen.load_path import MeasuredPoint
+from romgen.load_system import MeasuredPoint
 from romgen.reduced_model import ReducedModel
 from romgen.settings import BASE_ACCELERATION, ForcedPointSettings, ForcingSettings
 
@@ -42,6 +42,7 @@ class CalibratedPoint:
     deviation_percent : 100 (level_needed / level - 1); its spread over the points is the error of the scale.
     expected_percent : deviation that 2 % in amplitude and level and 0.1 % in frequency explain; sets the weight.
     by_amplitude, by_frequency : d ln level / d ln amplitude and d ln level / d ln frequency.
+    input_change_percent : how much stronger than at rest the load acts at this amplitude, which the model leaves out.
     mode : driven mode, from 1.
     distance : of the state in units of the trained range (above 1: outside).
     stable : in the model.
@@ -61,6 +62,7 @@ class CalibratedPoint:
     expected_percent: float
     by_amplitude: float
     by_frequency: float
+    input_change_percent: float
     mode: int
     distance: float
     stable: bool
@@ -193,6 +195,7 @@ def _calibrated(model: ReducedModel, unit: str, fit: LoadFit, k: int) -> Calibra
         expected_percent=float(fit.expected_percent[k]),
         by_amplitude=at.by_amplitude,
         by_frequency=at.by_frequency,
+        input_change_percent=100.0 * at.input_change,
         mode=point.mode + 1,
         distance=float(model.trained_range.distance(at.q[None])[0]),
         stable=at.stable,

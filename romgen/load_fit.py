@@ -22,7 +22,8 @@ from scipy.optimize import least_squares
 from romgen.arrays import FloatArray
 from romgen.errors import InputError, NumericalError
 from romgen.forcing import chart_input_matrix, sensor_shapes
-from romgen.load_path import LoadAtAmplitude, LoadPath, MeasuredPoint, load_path
+from romgen.load_path import LoadAtAmplitude, LoadPath, load_path
+from romgen.load_system import MeasuredPoint
 from romgen.reduced_model import ReducedModel
 
 # Shares that a careful measurement repeats to and a good model errs by; they set weights and what counts as a conflict.

@@ -12,9 +12,11 @@ from romgen.reduced_model import ReducedModel
 
 # Deviations of more than two expected ones are a conflict, not noise.
 CONFLICT = 2.0
-# Within so many half-bandwidths of the resonance a point may be meant as the peak, and needs more load the further the
+# A point within so many expected errors of the resonance may be meant as the peak, and needs more load the further the
 # resonance of the model is off: from this on it is worth a word.
-NEAR, WORTH_PERCENT = 2.0, 2.0
+NEAR, WORTH_PERCENT = 2.5, 2.0
+# Half of the error of forced amplitudes that is aimed at.
+CHANGED_PERCENT = 1.0
 # Shapes of another model that differ by more belong to other modes or sensors.
 OTHER_SHAPE_PERCENT = 10.0
 
@@ -27,7 +29,7 @@ def calibration_notes(model: ReducedModel, name: str, fit: LoadFit, sign: int) -
         _sign(model, name, fit, sign),
         *fit.notes,
         *_points(model, fit),
-        *_resonances(model, fit),
+        *_resonances(fit),
     )
 
 
@@ -90,20 +92,24 @@ def _points(model: ReducedModel, fit: LoadFit) -> Iterator[str]:
             yield f"{point.name}: its amplitude lies outside the trained range, {distance:.2f} times its boundary"
         if not at.stable:
             yield f"{point.name}: the model is not stable there, a sweep would jump; its frequency may be off"
+        if abs(100.0 * at.input_change) > CHANGED_PERCENT:
+            yield (
+                f"{point.name}: by the chart of the model the load acts here {100.0 * at.input_change:+.1f} % stronger "
+                "than at rest; the model keeps one value, so the load holds near the amplitudes of the points"
+            )
         if at.crossings > 1:
             yield f"{point.name}: the model shows this amplitude at {at.crossings} levels; the first from rest is taken"
 
 
-def _resonances(model: ReducedModel, fit: LoadFit) -> Iterator[str]:
+def _resonances(fit: LoadFit) -> Iterator[str]:
     """Frequencies of peaks, and points that may be peaks: off its resonance the model needs more load, never less."""
     for path, at, peak in zip(fit.paths, fit.needed, fit.resonances, strict=True):
         point = path.point
         if peak is None or point.frequency_hz is None:
             continue
-        half_bandwidth = abs(float(model.eigenvalues[point.mode].real)) / (2.0 * np.pi)
         off, more = point.frequency_hz - peak.frequency_hz, 100.0 * (at.level / peak.level - 1.0)
         here = f"{point.name}: at this amplitude the model resonates at {peak.frequency_hz:.2f} Hz"
         if point.peak and abs(off) > FREQUENCY_ERROR * peak.frequency_hz:
             yield f"{here}, the measured peak is at {point.frequency_hz:.2f} Hz"
-        if not point.peak and abs(off) < NEAR * half_bandwidth and more > WORTH_PERCENT:
+        if not point.peak and abs(off) < NEAR * FREQUENCY_ERROR * peak.frequency_hz and more > WORTH_PERCENT:
             yield f"{here} and needs {more:.0f} % more load at {point.frequency_hz:.2f} Hz; is it a peak (peak = true)?"

@@ -6,7 +6,7 @@ function of the amplitude: every measured amplitude belongs to one load, also on
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from romgen.arrays import ComplexArray, FloatArray
 from romgen.branch import Branch, ContinuationSettings
 from romgen.continuation import continue_branch, solve_at
 from romgen.errors import InputError, NumericalError
-from romgen.forced_curve import ForcedSystem
-from romgen.forced_response import LIMIT, forced_system
-from romgen.lifted_orbit import SAMPLES, Measure, orbit_amplitudes
+from romgen.forced_response import LIMIT
+from romgen.forcing import input_at_states
+from romgen.lifted_orbit import SAMPLES, orbit_amplitudes
+from romgen.load_system import LoadSystem, MeasuredPoint, load_system
 from romgen.reduced_model import ReducedModel
 
 # A resonance is followed from this share of what the linear model needs (of the trained amplitude at most).
@@ -33,85 +34,6 @@ NEWTON_STEPS, NEWTON_TOLERANCE = 30, 1e-10
 
 
 @dataclass(frozen=True)
-class MeasuredPoint:
-    """A measured steady state, for one input.
-
-    Attributes
-    ----------
-    name : how messages call it.
-    level : amplitude of the cosine on the input, in its unit.
-    frequency_hz : forcing frequency; of a peak what was measured, or None.
-    peak : it is the peak of the response, which is taken as phase resonance at the frequency of the model.
-    sensor : row of the sensor maps; measure, amplitude : what it showed, m.
-    mode : index of the mode that is driven near resonance.
-    """
-
-    name: str
-    level: float
-    frequency_hz: float | None
-    sensor: int
-    measure: Measure
-    amplitude: float
-    mode: int
-    peak: bool = False
-
-
-@dataclass(frozen=True)
-class LoadSystem:
-    """F(x, Omega) + p F_l = 0 with one more condition, as ``romgen.branch.ParameterSystem`` of the load p.
-
-    State (x, w), Omega = Omega_0 + w Omega_1. The condition is w = 0, or phase resonance of the driven mode,
-    Im(conj(l_j) q_j) = 0: load and velocity in phase.
-
-    Attributes
-    ----------
-    model : with ``column``, (m,) complex G of this input, 1/s per input unit.
-    mode : index j of the driven mode.
-    still : the system without load.
-    push : (n,) F_l, the residual of a unit load at x = 0.
-    phase : (n,) row of the phase condition; None keeps the frequency.
-    omega, spread : Omega_0 and Omega_1, rad/s.
-    """
-
-    model: ReducedModel
-    column: ComplexArray = field(metadata={"unit": "1/s per input unit", "axes": "mode"})
-    mode: int
-    still: ForcedSystem
-    push: FloatArray = field(metadata={"unit": "1/s per input unit", "axes": "state"})
-    phase: FloatArray | None = field(metadata={"unit": "1", "axes": "state"})
-    omega: float
-    spread: float
-
-    def linearise(self, x: FloatArray, p: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the residual (n + 1,), its Jacobian by (x, w) and its derivative by the load p."""
-        F, F_x, F_omega = self.still.linearise(x[:-1], self.frequency(x))
-        row = np.append(np.zeros(F.size), 1.0) if self.phase is None else np.append(self.phase, 0.0)
-        residual = np.append(F + p * self.push, row @ x)
-        J = np.vstack([np.column_stack([F_x, self.spread * F_omega]), row])
-        return residual, J, np.append(self.push, 0.0)
-
-    def multipliers(self, x: FloatArray, p: float) -> ComplexArray:
-        """Return the Floquet multipliers of the orbit; the load does not enter them but through x."""
-        return self.still.multipliers(x[:-1], self.frequency(x))
-
-    def frequency(self, x: FloatArray) -> float:
-        """Return Omega in rad/s of a state (x, w)."""
-        return self.omega + self.spread * float(x[-1])
-
-    def loaded(self, p: float) -> ForcedSystem:
-        """Return the system under p cos(Omega t): complex amplitude G p / 2."""
-        return forced_system(self.model, np.asarray(0.5 * p * self.column), self.mode)
-
-    def amplitudes(self, states: FloatArray, p: float, point: MeasuredPoint) -> FloatArray:
-        """Return the amplitude (n_state,) in m at the sensor and in the measure of a point, all under the load p."""
-        system = self.loaded(p)
-        omega = self.omega + self.spread * states[:, -1]
-        orbits = orbit_amplitudes(self.model, system.orbits(states[:, :-1], omega, SAMPLES * system.forced))
-        chosen = orbits.max if point.measure == "max" else orbits.sqrt2_rms
-        return np.asarray(chosen[:, point.sensor])
-
-
-@dataclass(frozen=True)
 class LoadAtAmplitude:
     """The load at which the model shows the amplitude of a point.
 
@@ -123,6 +45,8 @@ class LoadAtAmplitude:
     by_amplitude, by_frequency : d ln level / d ln amplitude and d ln level / d ln frequency (0 at a resonance).
     stable : whether a sweep would stay there.
     crossings : how often the branch passes this amplitude; the first one from rest is taken.
+    input_change : how much stronger than at rest the load acts on the driven mode along this orbit, by the chart of the
+        model (``romgen.forcing.input_at_states``); the model itself keeps the value at rest.
     """
 
     level: float
@@ -132,6 +56,7 @@ class LoadAtAmplitude:
     by_frequency: float
     stable: bool
     crossings: int
+    input_change: float
 
 
 @dataclass(frozen=True)
@@ -208,7 +133,19 @@ class LoadPath:
             by_frequency=float(np.linalg.solve(J, turned)[-1] / v[-1]),
             stable=bool(np.all(np.abs(self.system.multipliers(v[:-1], float(v[-1]))) < 1.0)),
             crossings=crossings,
+            input_change=self._input_change(v),
         )
+
+    def _input_change(self, v: FloatArray) -> float:
+        """Return abs(mean of 2 e^{-i phi} G_j(z(phi)) cos(phi)) / abs(G_j) - 1 over the orbit of v, load cos(phi)."""
+        system, mode = self.system, self.system.mode
+        loaded = system.loaded(float(v[-1]))
+        n = SAMPLES * loaded.forced
+        z = loaded.orbits(v[None, :-2], np.array([system.frequency(v[:-1])]), n)[0]
+        phase = 2.0 * np.pi * loaded.forced * np.arange(n) / n
+        G = input_at_states(system.model, z, system.column)[:, mode]
+        mean = np.mean(2.0 * np.exp(-1j * phase) * G * np.cos(phase))
+        return float(np.abs(mean / system.column[mode])) - 1.0
 
     @property
     def _scale(self) -> FloatArray:
@@ -242,7 +179,7 @@ def load_path(model: ReducedModel, column: ComplexArray, point: MeasuredPoint) -
     """
     if column[point.mode] == 0.0:
         raise InputError("the load does not drive the mode", where=point.name, value=f"mode {point.mode + 1}")
-    system = _load_system(model, column, point)
+    system = load_system(model, column, point)
     trained, linear = float(np.max(model.trained_amplitude)), system.loaded(1.0).linear_response(system.omega)
     small = SMALL * trained / float(np.max(np.abs(linear)))
     needed = small * point.amplitude / _linear_amplitude(system, small, point)
@@ -275,24 +212,6 @@ def _followed(
         raise NumericalError("no forced orbit at a small load", where=point.name, history=error.history) from error
     read = [system.amplitudes(x[None], p, point)[0] for x, p in zip(branch.x, branch.p, strict=True)]
     return LoadPath(point, system, settings, branch, np.array(read, dtype=np.float64))
-
-
-def _load_system(model: ReducedModel, column: ComplexArray, point: MeasuredPoint) -> LoadSystem:
-    eigenvalue = model.eigenvalues[point.mode]
-    if point.frequency_hz is None and not point.peak:
-        raise InputError("a point that is no peak needs a frequency", where=point.name)
-    omega = float(eigenvalue.imag) if point.peak else 2.0 * np.pi * float(point.frequency_hz or 0.0)
-    unit = 0.5 * column
-    still = forced_system(model, np.zeros_like(unit), point.mode)
-    rest = still.start(np.zeros_like(unit), omega)
-    push = forced_system(model, unit, point.mode).linearise(rest, omega)[0]
-    phase: FloatArray | None = None
-    if point.peak:
-        direction = unit[point.mode].conjugate() / abs(unit[point.mode])
-        phase = np.asarray((direction * still.modal(np.eye(rest.size))[:, point.mode]).imag)
-    # w counts as a state: the branch ends where the resonance has moved by its whole frequency
-    spread = omega / (LIMIT * float(np.max(model.trained_amplitude)))
-    return LoadSystem(model, column, point.mode, still, push, phase, omega, spread)
 
 
 def _linear_amplitude(system: LoadSystem, p: float, point: MeasuredPoint) -> float:

@@ -14,7 +14,8 @@ from romgen.forced_response import forced_response
 from romgen.forcing import chart_input_matrix, sensor_shapes, with_inputs
 from romgen.learn import Learned, learn
 from romgen.load_calibration import Forcing, InputLoad, calibrate_forcing
-from romgen.load_path import MeasuredPoint, load_path
+from romgen.load_path import load_path
+from romgen.load_system import MeasuredPoint
 from romgen.reduced_model import ReducedModel
 from romgen.settings import ForcedResponseSettings, ForcingSettings, LearnSettings
 from romgen.store import read_record, write_record

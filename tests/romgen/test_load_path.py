@@ -11,7 +11,8 @@ from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.forced_response import forced_response
 from romgen.lifted_orbit import Measure
-from romgen.load_path import LoadPath, MeasuredPoint, load_path
+from romgen.load_path import LoadPath, load_path
+from romgen.load_system import MeasuredPoint
 from romgen.reduced_model import ReducedModel
 from romgen.settings import ForcedResponseSettings
 from tests.normal_form_models import averaged_oscillator, damped_oscillator, published_order7, resonant_pair
