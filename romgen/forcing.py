@@ -63,12 +63,20 @@ def chart_input_matrix(model: ReducedModel, modal_load: FloatArray) -> ComplexAr
     Returns
     -------
     (m, n_input) complex, 1/s per input unit.
+
+    Raises
+    ------
+    InputError : the linear part of the chart is singular.
     """
     m = model.eigenvalues.size
     first = linear_part(model.chart)
     V = 0.5 * (first[:, :m] + first[:, m:].conj())
     force = np.vstack([np.zeros_like(modal_load), modal_load]) / model.scale[:, None]
-    return np.asarray(np.linalg.solve(np.hstack([V, V.conj()]), force)[:m], dtype=np.complex128)
+    try:
+        return np.asarray(np.linalg.solve(np.hstack([V, V.conj()]), force)[:m], dtype=np.complex128)
+    except np.linalg.LinAlgError as error:
+        advice = "pass a model whose chart has displacement and velocity of every mode"
+        raise InputError("the chart cannot be inverted", where=f"model {model.name}", advice=advice) from error
 
 
 def with_inputs(
