@@ -93,7 +93,7 @@ def export(context: Context) -> Exported:
     )
     share = 0.5 if study.fmu.fmi3 else 1.0
     native = export_fmu(model, _path(context, ""), study.fmu, info=info, report=_part(context.report, 0.0, share))
-    for note in native.notes:
+    for note in (*native.notes, *_absolute_notes(study)):
         log.warning("%s", note)
     python = (
         export_pythonfmu(model, _path(context, "_pythonfmu"), study.fmu, info=info) if study.fmu.pythonfmu else None
@@ -103,6 +103,13 @@ def export(context: Context) -> Exported:
         report = _part(context.report, share, 1.0)
         array_unit = export_fmi3(model, _path(context, "_fmi3"), study.fmu, info=info, report=report)
     return Exported(native, python, array_unit)
+
+
+def _absolute_notes(study: Study) -> tuple[str, ...]:
+    """Recorded data do not say which way their sensors look."""
+    if study.data is None or not study.fmu.absolute:
+        return ()
+    return ("absolute outputs add the motion of the base to every sensor: sensors across it are wrong",)
 
 
 def _load_sources(context: Context) -> tuple[str, ...]:

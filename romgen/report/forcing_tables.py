@@ -16,7 +16,7 @@ def load_table(loads: tuple[InputLoad, ...]) -> TableBlock:
     rows = tuple(
         (
             load.input.replace("_", " "),
-            f"measured at {len(load.points)} points" if load.points else "given participation",
+            _source(load),
             ", ".join(f"{f:.4g}" for f in load.modal_load),
             ", ".join(f"{d:.1f}" if np.isfinite(d) else "-" for d in load.deviation_percent),
             f"{load.spread_percent:.1f}" if np.isfinite(load.spread_percent) else "-",
@@ -29,6 +29,11 @@ def load_table(loads: tuple[InputLoad, ...]) -> TableBlock:
         "Recorded data do not hold these loads; they are as good as the points."
     )
     return TableBlock(caption, ("input", "from", "load on the modes", "deviation [%]", "spread [%]"), rows)
+
+
+def _source(load: InputLoad) -> str:
+    n = len(load.points)
+    return f"{n} measured point{'s' * (n > 1)}" if n else "given participation"
 
 
 def calibration_table(load: InputLoad) -> TableBlock:
