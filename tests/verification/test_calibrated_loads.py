@@ -115,7 +115,7 @@ def test_how_the_load_acts_at_large_amplitude(truth: ReducedModel, learned: Lear
 
 
 @pytest.fixture(scope="module")
-def benchmark() -> ReducedModel:
+def panel() -> ReducedModel:
     """Order 7, which cross-validation chooses too."""
     if not TRC.is_file():
         pytest.skip(f"{TRC} is absent")
@@ -123,8 +123,8 @@ def benchmark() -> ReducedModel:
     return learn(motions, [], LearnSettings(internal_resonance=(1, 2), order=7), "benchmark").model
 
 
-def published(benchmark: ReducedModel, load: InputLoad) -> list[ForcedCurve]:
-    model = Forcing((load,)).applied(benchmark)
+def published(panel: ReducedModel, load: InputLoad) -> list[ForcedCurve]:
+    model = Forcing((load,)).applied(panel)
     return [response(model, level, (98.0, 116.0), "max") for level in (2.0, 4.0)]
 
 
@@ -134,12 +134,12 @@ READ_M, DAMPING, LINEAR_HZ = 0.01e-3, 0.04, 0.2
 
 
 @pytest.mark.slow
-def test_published_response_from_its_lower_peak(benchmark: ReducedModel) -> None:
+def test_published_response_from_its_lower_peak(panel: ReducedModel) -> None:
     """Calibrated on the peak at 2 m/s2 alone: 4 m/s2 and all folds (TRC.md B.2: largest displacement at mid)."""
     peak = {"level": 2.0, "frequency_hz": 108.5, "sensor": "mid", "amplitude": 0.62e-3, "measure": "max", "peak": True}
-    load = forcing(benchmark, peak).loads[0]
-    assert sensor_shapes(benchmark)[1, 0] * load.modal_load[0] == pytest.approx(PARTICIPATION, rel=0.06)
-    lower, upper = published(benchmark, load)
+    load = forcing(panel, peak).loads[0]
+    assert sensor_shapes(panel)[1, 0] * load.modal_load[0] == pytest.approx(PARTICIPATION, rel=0.06)
+    lower, upper = published(panel, load)
     assert lower.peak_m == pytest.approx(0.62e-3, rel=1e-3)
     assert upper.peak_m == pytest.approx(1.29e-3, rel=DAMPING + READ_M / 0.62e-3 + READ_M / 1.29e-3)
     for curve, folds in ((lower, (108.53, 109.05)), (upper, (104.87, 108.08))):
@@ -148,10 +148,10 @@ def test_published_response_from_its_lower_peak(benchmark: ReducedModel) -> None
 
 
 @pytest.mark.slow
-def test_published_response_from_the_participation(benchmark: ReducedModel) -> None:
+def test_published_response_from_the_participation(panel: ReducedModel) -> None:
     """1.32 at mid follows from a flat strip (TRC.md A.4): both peaks, nothing measured."""
     table = ForcingSettings(participation={"mid": (PARTICIPATION, 0.0)})
-    curves = published(benchmark, calibrate_forcing(benchmark, {"base_acceleration": table}).loads[0])
+    curves = published(panel, calibrate_forcing(panel, {"base_acceleration": table}).loads[0])
     for curve, peak in zip(curves, (0.62e-3, 1.29e-3), strict=True):
         assert curve.peak_m == pytest.approx(peak, rel=DAMPING + READ_M / peak)
 
