@@ -246,7 +246,9 @@ def _downstream_problems(study: Study) -> Iterator[str]:
     forced, known = study.forced_response, study.sensor_names
     if forced.sensor is not None and forced.sensor not in known:
         yield unknown("[forced_response] sensor:", "sensor", forced.sensor, known)
-    if forced.levels and forced.input not in study.load_inputs:
+    if forced.levels and study.data is not None and not study.forcing:
+        yield f"[forced_response] levels need a load input, which data do not have; add [forcing.{forced.input}]"
+    elif forced.levels and forced.input not in study.load_inputs:
         yield unknown("[forced_response] input:", "load input", forced.input, study.load_inputs)
     if study.forced_validation is not None and (study.data is not None or not forced.levels):
         yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"

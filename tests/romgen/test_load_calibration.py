@@ -171,6 +171,19 @@ def test_participation_at_a_blind_sensor(known: ReducedModel) -> None:
     assert calibrate_forcing(blind, {"base_acceleration": table}).loads[0].modal_load[1] == 0.0
 
 
+def test_two_inputs_are_two_columns(known: ReducedModel) -> None:
+    tables = {
+        "base_acceleration": ForcingSettings(points=(point(true_model(LOAD), 1.0, 109.9, "mid"),)),
+        "hammer": ForcingSettings(participation={"upper": (0.9, -0.5)}),
+    }
+    forcing = calibrate_forcing(known, tables)
+    model = forcing.applied(known)
+    assert (model.inputs, model.input_units) == (("base_acceleration", "hammer"), ("m/s2", "N"))
+    columns = [chart_input_matrix(known, load.modal_load[:, None])[:, 0] for load in forcing.loads]
+    np.testing.assert_array_equal(model.input_matrix, np.column_stack(columns))
+    np.testing.assert_allclose(forcing.loads[1].modal_load, np.array([0.9, -0.5]) / SHAPES[2], rtol=1e-12)
+
+
 def test_notes_say_what_the_load_rests_on(known: ReducedModel) -> None:
     truth = true_model(LOAD)
     load = calibrated(known, point(truth, 1.0, 109.9, "mid"))

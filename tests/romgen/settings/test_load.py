@@ -200,6 +200,17 @@ def test_mistake_in_a_load_of_data_is_one_line(tmp_path: Path, name: str, table:
     assert "\n" not in found[0]
 
 
+def test_levels_without_a_load_say_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "a.mat").write_bytes(b"x")
+    data = {"files": ["a.mat"], "sensors": ["mid"], "training": [0]}
+    found = problems(tmp_path, {"study": {"name": "lab"}, "data": data, "forced_response": {"levels": [1.0]}})
+    assert len(found) == 1
+    assert (
+        "[forced_response] levels need a load input, which data do not have; add [forcing.base_acceleration]"
+        in found[0]
+    )
+
+
 def test_loads_of_data_are_inputs(tmp_path: Path) -> None:
     (tmp_path / "a.mat").write_bytes(b"x")
     data = {"files": ["a.mat"], "sensors": ["lower", "mid"], "training": [0]}
