@@ -101,25 +101,15 @@ class LoadPath:
         read = (1.0 - share) * self.amplitude[rows] + share * self.amplitude[rows + 1]
         k = int(np.argmin(np.abs(read - self.point.amplitude)))
         guess = (1.0 - share[k]) * self.branch.x[rows[k]] + share[k] * self.branch.x[rows[k] + 1]
-        x = solve_at(self.system, guess, level, replace(self.settings, iterations=NEWTON_STEPS))
+        try:
+            x = solve_at(self.system, guess, level, replace(self.settings, iterations=NEWTON_STEPS))
+        except NumericalError:  # on a fold of the level the state there is not isolated
+            return float("nan")
         return float(self.system.amplitudes(x[None], level, self.point)[0])
 
     def _solved(self, v: FloatArray, crossings: int) -> LoadAtAmplitude:
         """Return the solution of F = 0, amplitude = measured by Newton's method from v = (x, w, p)."""
-        wanted = self.point.amplitude
-        for _ in range(NEWTON_STEPS):
-            residual, J = self._bordered(v)
-            update = np.linalg.solve(J, -residual)
-            v = v + update
-            if np.max(np.abs(update / self._scale)) < NEWTON_TOLERANCE:
-                break
-        else:
-            raise NumericalError(
-                "Newton's method found no load for the measured amplitude",
-                where=self.point.name,
-                value=f"{1e3 * wanted:.4g} mm",
-                advice="leave the point out, or take one further away from a fold",
-            )
+        v = self._corrected(v)
         J = self._bordered(v)[1]
         aimed, turned = np.zeros(v.size), np.zeros(v.size)
         aimed[-1] = 1.0  # in units of the amplitude
@@ -136,6 +126,27 @@ class LoadPath:
             input_change=self._input_change(v),
         )
 
+    def _corrected(self, v: FloatArray) -> FloatArray:
+        """Return the solution v = (x, w, p) that Newton's method reaches."""
+        updates: list[float] = []
+        for _ in range(NEWTON_STEPS):
+            residual, J = self._bordered(v)
+            try:
+                update = np.linalg.solve(J, -residual)
+            except np.linalg.LinAlgError:
+                break
+            v = v + update
+            updates.append(float(np.max(np.abs(update / self._scale))))
+            if updates[-1] < NEWTON_TOLERANCE and v[-1] > 0.0:
+                return v
+        raise NumericalError(
+            "Newton's method found no load for the measured amplitude",
+            where=self.point.name,
+            value=f"{1e3 * self.point.amplitude:.4g} mm",
+            advice="leave the point out, or take one at another level",
+            history=tuple(updates),
+        )
+
     def _input_change(self, v: FloatArray) -> float:
         """Return abs(mean of 2 e^{-i phi} G_j(z(phi)) cos(phi)) / abs(G_j) - 1 over the orbit of v, load cos(phi)."""
         system, mode = self.system, self.system.mode
@@ -143,7 +154,10 @@ class LoadPath:
         n = SAMPLES * loaded.forced
         z = loaded.orbits(v[None, :-2], np.array([system.frequency(v[:-1])]), n)[0]
         phase = 2.0 * np.pi * loaded.forced * np.arange(n) / n
-        G = input_at_states(system.model, z, system.column)[:, mode]
+        try:
+            G = input_at_states(system.model, z, system.column)[:, mode]
+        except np.linalg.LinAlgError:  # the chart folds over, far outside its range
+            return float("nan")
         mean = np.mean(2.0 * np.exp(-1j * phase) * G * np.cos(phase))
         return float(np.abs(mean / system.column[mode])) - 1.0
 

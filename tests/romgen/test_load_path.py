@@ -124,6 +124,17 @@ def test_orbit_at_the_level_has_the_amplitude(measure: Measure) -> None:
     assert abs(other.level / at.level - 1.0) > 1e-3
 
 
+def test_level_that_the_branch_does_not_pass_has_no_amplitude() -> None:
+    path = measured(averaged_oscillator(GAMMA, DAMPING), 0.5, 1.0 / TWO_PI)
+    assert np.isnan(replace(path, point=replace(path.point, level=1e6)).amplitude_at_level())
+
+
+def test_input_acts_as_at_rest_where_the_chart_is_linear() -> None:
+    """x = z + conj z and x' = lambda z + c.c. exactly: a force changes x'' by as much everywhere."""
+    model = damped_oscillator(0.02, 0.3, 0.1)
+    assert measured(model, 0.6, 0.97 / TWO_PI).crossing().input_change == pytest.approx(0.0, abs=1e-12)
+
+
 def test_second_mode_is_followed_from_rest() -> None:
     """Below the threshold of the 1:2 resonance only the second mode answers: linear, level 8 omega zeta 2 omega rho."""
     model = resonant_pair(0.1, 0.01)
