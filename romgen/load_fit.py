@@ -103,7 +103,7 @@ def fit_load(problem: LoadProblem, sign: float) -> LoadFit:
     f, notes = start, tuple[str, ...]()
     if len(problem.loaded) > 1:
         f, notes = _several(problem, start, sigma)
-    f = f * _turn(problem, f, sign)
+    f = _turn(problem, f, sign) * f + 0.0  # no negative zeros
     paths = problem.paths(f)
     needed = [path.crossing() for path in paths]
     r = problem.log_levels(needed)
