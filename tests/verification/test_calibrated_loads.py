@@ -9,7 +9,7 @@ import pytest
 
 from romgen.forced_curve import ForcedCurve
 from romgen.forced_response import forced_response
-from romgen.forced_validation import ForcedValidation
+from romgen.forced_validation import ForcedPoint, ForcedValidation
 from romgen.forcing import sensor_shapes
 from romgen.learn import Learned, learn
 from romgen.lifted_orbit import Measure
@@ -158,30 +158,27 @@ def test_published_response_from_the_participation(panel: ReducedModel) -> None:
 
 @pytest.mark.slow
 def test_quick_start_from_its_sensors_and_one_point(tmp_path: Path) -> None:
-    """Sensors of the finite-element ring-downs and one forced point of it: the other three within the limit of 5 %.
+    """Sensors of the finite-element ring-downs and one forced point of it predict the other three.
 
-    The model that knows modes and loads errs by up to 3.5 % there.
+    Limit: 2 % aimed at and 3 % by which the load acts differently at the largest amplitude, which the model leaves out.
     """
     result = run(load_study(ROOT / "models" / "clamped_panel" / "study.toml"), tmp_path, until="forced_validation")
     points = result.context.record("forced_validation", ForcedValidation).points
     motions = [item.trajectory for item in result.context.record("ringdowns", RingDowns).training]
     seen = [Trajectory(motion.name, motion.t, motion.sensors, motion.displacement) for motion in motions]
     model = learn(seen, [], LearnSettings(internal_resonance=(1, 2), order=5), "panel").model
-    tables = [
-        {"level": p.load, "frequency_hz": p.frequency_hz, "sensor": p.sensor, "amplitude": p.fe_m} for p in points
-    ]
-    load = forcing(model, tables[1]).loads[0]
-    for table in tables:
-        point = forcing(model, table).loads[0].points[0]
-        at = np.array([level_amplitude(model, load, table)])
-        assert at == pytest.approx(point.measured_m, rel=0.05)
+    one = points[1]
+    table = {"level": one.load, "frequency_hz": one.frequency_hz, "sensor": one.sensor, "amplitude": one.fe_m}
+    calibrated = forcing(model, table).applied(model)
+    for point in points:
+        assert amplitude(calibrated, point) == pytest.approx(point.fe_m, rel=0.05)
 
 
-def level_amplitude(model: ReducedModel, load: InputLoad, table: dict[str, object]) -> float:
-    """Amplitude of the calibrated model under the level of a point, nearest to its measurement."""
-    curve = response(Forcing((load,)).applied(model), float(str(table["level"])), (98.0, 116.0))
-    hz, amplitude = curve.frequency_hz, curve.amplitude_sqrt2_rms[:, 1]
-    rows = np.flatnonzero(np.diff(np.sign(hz - float(str(table["frequency_hz"])))))
-    share = (float(str(table["frequency_hz"])) - hz[rows]) / (hz[rows + 1] - hz[rows])
-    read = (1.0 - share) * amplitude[rows] + share * amplitude[rows + 1]
-    return float(read[np.argmin(np.abs(read - float(str(table["amplitude"]))))])
+def amplitude(model: ReducedModel, point: ForcedPoint) -> float:
+    """Amplitude of the model at level and frequency of a point, on the part of its response nearest to it."""
+    curve = response(model, point.load, (98.0, 116.0))
+    hz, read = curve.frequency_hz, curve.amplitude_sqrt2_rms[:, model.sensors.index(point.sensor)]
+    rows = np.flatnonzero(np.diff(np.sign(hz - point.frequency_hz)))
+    share = (point.frequency_hz - hz[rows]) / (hz[rows + 1] - hz[rows])
+    there = (1.0 - share) * read[rows] + share * read[rows + 1]
+    return float(there[np.argmin(np.abs(there - point.fe_m))])
