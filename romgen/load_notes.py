@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from romgen.arrays import FloatArray
+from romgen.forcing import chart_input_matrix, input_at_states
+from romgen.lifted_orbit import SAMPLES
 from romgen.load_fit import AMPLITUDE_ERROR, FREQUENCY_ERROR, LEVEL_ERROR, LoadFit
 from romgen.reduced_model import ReducedModel
 
@@ -17,6 +19,10 @@ CONFLICT = 2.0
 NEAR, WORTH_PERCENT = 2.5, 2.0
 # Half of the error of forced amplitudes that is aimed at.
 CHANGED_PERCENT = 1.0
+# Share of the trained amplitude at which a given load is looked at.
+HALF = 0.5
+# A mode with less than this share of the largest load is hardly driven.
+DRIVEN = 0.01
 # Shapes of another model that differ by more belong to other modes or sensors.
 OTHER_SHAPE_PERCENT = 10.0
 
@@ -45,6 +51,7 @@ def participation_notes(
     """
     shapes, shares = given
     notes = [f"the load of input {name} was given by participation, not computed or measured"]
+    notes += list(_changes(model, name, f))
     missed = 100.0 * np.linalg.norm(shares - shapes * f, axis=0)
     size = np.linalg.norm(shares, axis=0)
     notes += [
@@ -54,6 +61,24 @@ def participation_notes(
         if missed[j] > OTHER_SHAPE_PERCENT * size[j]
     ]
     return tuple(notes)
+
+
+def _changes(model: ReducedModel, name: str, f: FloatArray) -> Iterator[str]:
+    """How much differently the load acts on a mode in resonance at half its trained amplitude."""
+    column = chart_input_matrix(model, f[:, None])[:, 0]
+    phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    for j in np.flatnonzero(np.abs(f) > DRIVEN * np.max(np.abs(f))):
+        z = np.zeros((SAMPLES, f.size), dtype=np.complex128)
+        z[:, j] = HALF * model.trained_amplitude[j] * np.exp(1j * phase)
+        G = input_at_states(model, z, column)[:, j]
+        # the load in phase with the velocity: cos(phase - arg G)
+        mean = np.mean(2.0 * np.exp(-1j * phase) * G * np.cos(phase - np.angle(column[j])))
+        change = 100.0 * (float(np.abs(mean / column[j])) - 1.0)
+        if abs(change) > CHANGED_PERCENT:
+            yield (
+                f"by the chart of the model input {name} acts {change:+.1f} % stronger on mode {j + 1} at half its "
+                "trained amplitude than at rest; the model keeps one value: forced amplitudes err by about as much"
+            )
 
 
 def _source(name: str, fit: LoadFit) -> str:

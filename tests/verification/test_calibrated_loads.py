@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from romgen.backbone import backbone
 from romgen.forced_curve import ForcedCurve
 from romgen.forced_response import forced_response
 from romgen.forced_validation import ForcedPoint, ForcedValidation
@@ -112,6 +113,20 @@ def test_how_the_load_acts_at_large_amplitude(truth: ReducedModel, learned: Lear
         corrected = needed / (1.0 + point.points[0].input_change_percent / 100.0)
         assert abs(corrected - 1.0) < error_of_the_dynamics(learned, true.peak_m)
         assert abs(corrected - 1.0) < 0.5 * abs(needed - 1.0)
+
+
+def test_given_participation_says_what_the_model_leaves_out(learned: Learned) -> None:
+    """The change along the orbit of a peak of that amplitude, where mode 2 follows: 0.1 %, to the printed digit."""
+    table = ForcingSettings(participation={"mid": (PARTICIPATION, 0.0)})
+    load = calibrate_forcing(learned.model, {"base_acceleration": table}).loads[0]
+    notes = [note for note in load.notes if "by the chart of the model" in note]
+    assert len(notes) == 1
+    said = float(notes[0].split("acts ")[1].split(" %")[0])
+    half = 0.5 * learned.model.trained_amplitude[0]
+    curve = backbone(learned.model, rho=np.array([half]))
+    peak = {"level": 2.0, "sensor": "mid", "amplitude": curve.amplitude_sqrt2_rms[0, 1]}
+    point = forcing(learned.model, peak).loads[0].points[0]
+    assert said == pytest.approx(point.input_change_percent, abs=0.1)
 
 
 @pytest.fixture(scope="module")
