@@ -17,7 +17,9 @@ from romgen.fmu.levels import validate_unit
 from romgen.fmu.python_export import export_pythonfmu
 from romgen.fmu.records import FmuCheck, FmuExport, FmuInfo, FmuLevels
 from romgen.fmu.reference_files import write_reference_files
-from romgen.learning_stages import learned, learned_model
+from romgen.forcing_stages import loaded_model, model_upstream
+from romgen.learning_stages import learned
+from romgen.load_calibration import Forcing
 from romgen.metrics import nmte_percent
 from romgen.progress import Report
 from romgen.settings import Study
@@ -64,8 +66,8 @@ class Validation:
 def fmu_stages(study: Study) -> tuple[Stage, ...]:
     """Return the stages for export and check."""
     return (
-        Stage("fmu", Exported, ("learn",), ("study", "forced_response", "fmu"), export, _unit_names),
-        Stage("validation", Validation, ("learn", "fmu"), (), validate),
+        Stage("fmu", Exported, model_upstream(study), ("study", "forced_response", "fmu"), export, _unit_names),
+        Stage("validation", Validation, (*model_upstream(study), "fmu"), (), validate),
     )
 
 
@@ -80,10 +82,10 @@ def _path(context: Context, suffix: str) -> Path:
 
 def export(context: Context) -> Exported:
     """Write the native unit and, if asked for, the pythonfmu one."""
-    study, model = context.study, learned_model(context)
+    study, model = context.study, loaded_model(context)
     errors = tuple((e.name, e.nmte_percent) for e in learned(context).validation)
     info = FmuInfo(
-        origin=(f"study {study.name}", f"inputs sha256 {context.key}"),
+        origin=(f"study {study.name}", f"inputs sha256 {context.key}", *_load_sources(context)),
         errors_percent=errors,
         base_share=_base_share(study),
         input_range=_input_range(study, model.inputs),
@@ -91,7 +93,7 @@ def export(context: Context) -> Exported:
     )
     share = 0.5 if study.fmu.fmi3 else 1.0
     native = export_fmu(model, _path(context, ""), study.fmu, info=info, report=_part(context.report, 0.0, share))
-    for note in native.notes:
+    for note in (*native.notes, *_absolute_notes(study)):
         log.warning("%s", note)
     python = (
         export_pythonfmu(model, _path(context, "_pythonfmu"), study.fmu, info=info) if study.fmu.pythonfmu else None
@@ -101,6 +103,19 @@ def export(context: Context) -> Exported:
         report = _part(context.report, share, 1.0)
         array_unit = export_fmi3(model, _path(context, "_fmi3"), study.fmu, info=info, report=report)
     return Exported(native, python, array_unit)
+
+
+def _absolute_notes(study: Study) -> tuple[str, ...]:
+    """Recorded data do not say which way their sensors look."""
+    if study.data is None or not study.fmu.absolute:
+        return ()
+    return ("absolute outputs add the motion of the base to every sensor: sensors across it are wrong",)
+
+
+def _load_sources(context: Context) -> tuple[str, ...]:
+    """What the loads of recorded data rest on: whoever gets the unit has no report."""
+    loads = context.record("forcing", Forcing).loads if context.study.forcing else ()
+    return tuple(note for load in loads for note in load.notes)
 
 
 def _part(report: Report, start: float, end: float) -> Report:
@@ -138,7 +153,7 @@ def validate(context: Context) -> Validation:
     with tempfile.TemporaryDirectory(prefix="romgen_twin_") as folder:
         twin = Path(folder) / "twin.fmu"
         settings = context.study.fmu.model_copy(update={"start": "state", "platforms": ("host",)})
-        export_fmu(learned_model(context), twin, settings, info=FmuInfo(base_share=_base_share(context.study)))
+        export_fmu(loaded_model(context), twin, settings, info=FmuInfo(base_share=_base_share(context.study)))
         return _validate(context, twin)
 
 
@@ -148,7 +163,7 @@ def _validate(context: Context, unit: Path) -> Validation:
     starts = [item.start for item in record.training if math.isfinite(item.nmte_percent)]
     check = check_fmu(
         unit,
-        record.model,
+        loaded_model(context),
         context.study.fmu,
         pythonfmu=_path(context, "_pythonfmu") if context.study.fmu.pythonfmu else None,
         z0=starts[0] if starts else None,
@@ -179,6 +194,6 @@ def with_fmi3(levels: FmuLevels, more: FmuLevels) -> FmuLevels:
 def _replay(context: Context, motion: TrajectoryError, unit: Path) -> Replay:
     """Rebuild a held-out motion from the start state that its first window gave."""
     run = replay(unit, motion.t, motion.start)
-    sensors = learned_model(context).sensors
+    sensors = learned(context).model.sensors
     columns = [sensors.index(sensor) for sensor in context.study.fmu.sensors or sensors]
     return Replay(motion.name, run.displacement, nmte_percent(motion.displacement[:, columns], run.displacement))

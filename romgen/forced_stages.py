@@ -10,6 +10,7 @@ from romgen.errors import InputError
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_response import forced_response
 from romgen.forced_validation import ForcedValidation, compare, forced_motion, operating_points
+from romgen.forcing_stages import loaded_model, model_upstream
 from romgen.learning_stages import learned, learned_model
 from romgen.load_histories import LoadHistories, compare_history, history_motion
 from romgen.model_stages import finite_elements, march, ringdown_settings
@@ -47,7 +48,7 @@ def _harmonic_stages(study: Study) -> tuple[Stage, ...]:
     backbones = Stage("backbone", Backbones, ("learn",), (), compute_backbones)
     if not study.forced_response.levels:
         return (backbones,)
-    response = Stage("forced_response", ForcedResponse, ("learn",), ("forced_response",), compute_response)
+    response = Stage("forced_response", ForcedResponse, model_upstream(study), ("forced_response",), compute_response)
     if study.forced_validation is None or study.data is not None:
         return (response, backbones)
     upstream = ("preload", "modes", "ringdowns", "learn", "forced_response")
@@ -57,7 +58,7 @@ def _harmonic_stages(study: Study) -> tuple[Stage, ...]:
 
 def compute_response(context: Context) -> ForcedResponse:
     """Follow the frequency responses at all levels."""
-    return forced_response(learned_model(context), context.study.forced_response)
+    return forced_response(loaded_model(context), context.study.forced_response)
 
 
 def validate_forced(context: Context) -> ForcedValidation:

@@ -5,11 +5,13 @@ Morsy, Xu, Tiso, Haller 2024, forced normal form z' = n(z) + B^-1 V^+ p(t).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
-from romgen.polynomial import PolynomialMap
+from romgen.polynomial import PolynomialMap, jacobian, zeta
 from romgen.reduced_model import ReducedModel
 
 
@@ -47,6 +49,76 @@ def input_matrix(
             advice=f"pass an array of shape ({m}, n_input)",
         )
     return np.asarray(linear_part(inverse_chart)[:, m:] / scale[m:] @ modal_load, dtype=np.complex128)
+
+
+def chart_input_matrix(model: ReducedModel, modal_load: FloatArray) -> ComplexArray:
+    """Return G of a finished model from the linear part of its chart, as ``romgen.learn`` forms it.
+
+    y / s = V z + conj(V z) + ..., so G = [V, conj V]^-1 [0; modal_load / s] in its first m rows.
+
+    Parameters
+    ----------
+    modal_load : (m, n_input) of eta'' = ... + modal_load u, in the data's own normalisation of eta.
+
+    Returns
+    -------
+    (m, n_input) complex, 1/s per input unit.
+
+    Raises
+    ------
+    InputError : the linear part of the chart is singular.
+    """
+    m = model.eigenvalues.size
+    first = linear_part(model.chart)
+    V = 0.5 * (first[:, :m] + first[:, m:].conj())
+    force = np.vstack([np.zeros_like(modal_load), modal_load]) / model.scale[:, None]
+    try:
+        return np.asarray(np.linalg.solve(np.hstack([V, V.conj()]), force)[:m], dtype=np.complex128)
+    except np.linalg.LinAlgError as error:
+        advice = "pass a model whose chart has displacement and velocity of every mode"
+        raise InputError("the chart cannot be inverted", where=f"model {model.name}", advice=advice) from error
+
+
+def with_inputs(
+    model: ReducedModel, inputs: tuple[str, ...], units: tuple[str, ...], modal_load: FloatArray
+) -> ReducedModel:
+    """Return the model with load inputs, modal_load (m, n_input) as in ``chart_input_matrix``."""
+    return replace(model, inputs=inputs, input_units=units, input_matrix=chart_input_matrix(model, modal_load))
+
+
+def input_at_states(model: ReducedModel, z: ComplexArray, column: ComplexArray) -> ComplexArray:
+    """Return how one input acts on z at states z (n, m): the exact counterpart of the constant G of the model.
+
+    A load changes eta' alone: w = y / s has w' = ... + 2 Re(V G) u, V of the linear chart, and w = Re(T zeta^E) gives
+
+        [dw/dz, dw/dconj(z)] (G(z), conj G(z)) = 2 Re(V G).
+
+    The model keeps G(0) = G: the leading order in the amplitude.
+
+    Parameters
+    ----------
+    column : (m,) G of the input.
+
+    Returns
+    -------
+    (n, m) complex, 1/s per input unit.
+    """
+    m = z.shape[1]
+
+    def slopes(at: ComplexArray) -> ComplexArray:
+        T = jacobian(model.chart, zeta(at))
+        return np.asarray(0.5 * (T + np.concatenate([T[..., m:], T[..., :m]], axis=-1).conj()))
+
+    push = slopes(np.zeros((1, m), dtype=np.complex128))[0] @ np.concatenate([column, column.conj()])
+    sides = np.broadcast_to(push[:, None], (len(z), 2 * m, 1))
+    return np.asarray(np.linalg.solve(slopes(z), sides)[:, :m, 0])
+
+
+def sensor_shapes(model: ReducedModel) -> FloatArray:
+    """Return Phi (n_sensor, m): displacement of each sensor per eta_j at small amplitude (1 where eta is in m)."""
+    m = model.eigenvalues.size
+    real = linear_part(PolynomialMap(model.displacement.exponents, model.displacement.coefficients.astype(complex)))
+    return np.asarray(real[:, :m].real / model.scale[:m])
 
 
 def base_acceleration_load(shapes: FloatArray, mass_times_direction: FloatArray) -> FloatArray:

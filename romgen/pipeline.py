@@ -6,6 +6,7 @@ from pathlib import Path
 
 from romgen.fmu_stages import fmu_stages
 from romgen.forced_stages import forced_stages
+from romgen.forcing_stages import forcing_stages, loaded_model
 from romgen.learning_stages import learned_model, learning_stages
 from romgen.model_stages import model_stages
 from romgen.progress import RunProgress
@@ -19,7 +20,8 @@ from romgen.summary import summarise, write_summary
 
 def stages_of(study: Study) -> tuple[Stage, ...]:
     """Return all stages of a study in their order."""
-    stages = (*model_stages(study), *learning_stages(study), *forced_stages(study), *fmu_stages(study))
+    model = (*model_stages(study), *learning_stages(study), *forcing_stages(study))
+    stages = (*model, *forced_stages(study), *fmu_stages(study))
     return (*stages, *report_stages(tuple(stage.name for stage in stages)))
 
 
@@ -55,5 +57,5 @@ def run(
 
 
 def reduced_model(result: RunResult) -> ReducedModel:
-    """Return the reduced model of a run that reached the stage "learn"."""
-    return learned_model(result.context)
+    """Return the reduced model of a run that reached the stage "learn"; loads of [forcing] need the stage "forcing"."""
+    return loaded_model(result.context) if "forcing" in result.infos else learned_model(result.context)

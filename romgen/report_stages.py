@@ -11,9 +11,11 @@ from romgen.fmu_stages import Exported, Validation
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
+from romgen.forcing_stages import loaded_model
 from romgen.jackknife import jackknife_deviation
 from romgen.learn import Learned
 from romgen.learning_stages import learned
+from romgen.load_calibration import Forcing, InputLoad
 from romgen.load_histories import LoadHistories
 from romgen.model_stages import RingDowns
 from romgen.polar_form import polar_text
@@ -50,14 +52,13 @@ def write(context: Context) -> ReportFiles:
 
 def report_inputs(context: Context) -> ReportInputs:
     """Gather what the report shows from the stages that there are."""
-    study, infos = context.study, context.infos()
+    study, infos, record = context.study, context.infos(), learned(context)
     ringdowns = _optional(context, "ringdowns", RingDowns)
     exported = _optional(context, "fmu", Exported)
     validation = _optional(context, "validation", Validation)
     backbones = _optional(context, "backbone", Backbones)
     forced = _optional(context, "forced_validation", ForcedValidation)
     histories = _optional(context, "load_histories", LoadHistories)
-    record = learned(context)
     return ReportInputs(
         study=study.name,
         title=study.report.title,
@@ -66,11 +67,12 @@ def report_inputs(context: Context) -> ReportInputs:
         modes=_optional(context, "modes", Modes),
         ring_downs=() if ringdowns is None else ringdowns.training + ringdowns.validation,
         reconstructions=reconstructions(context),
-        model=record.model,
+        model=loaded_model(context),
         polar_form=polar_text(record.model),
         resonance_reason=record.fit.resonance.reason,
         coefficient_deviation=_deviation(record),
         orders=_orders(record),
+        loads=_loads(context),
         forced=_optional(context, "forced_response", ForcedResponse),
         forced_points=() if forced is None else forced.points,
         histories=() if histories is None else histories.histories,
@@ -90,6 +92,12 @@ def report_inputs(context: Context) -> ReportInputs:
         vtu=study.report.vtu,
         limits=study.acceptance,
     )
+
+
+def _loads(context: Context) -> tuple[InputLoad, ...]:
+    """The load inputs of recorded data."""
+    forcing = _optional(context, "forcing", Forcing)
+    return () if forcing is None else forcing.loads
 
 
 def _deviation(record: Learned) -> FloatArray | None:

@@ -15,6 +15,7 @@ from romgen.fmu_stages import Exported, Validation
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_stages import Backbones
 from romgen.forced_validation import ForcedValidation
+from romgen.forcing_stages import forcing_summary
 from romgen.learning_stages import learning_summary
 from romgen.load_histories import LoadHistories
 from romgen.model_stages import RingDowns
@@ -199,6 +200,7 @@ PARTS: dict[str, tuple[str, Callable[[Context], Any]]] = {
     "modes": ("modes", _modes),
     "ringdowns": ("ringdowns", _ringdowns),
     "learn": ("learn", learning_summary),
+    "forcing": ("forcing", forcing_summary),
     "forced_response": ("forced_response", _forced_response),
     "forced_validation": ("forced_validation", _forced_validation),
     "load_histories": ("load_histories", _load_histories),

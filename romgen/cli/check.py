@@ -60,7 +60,7 @@ def describe(study: Study) -> str:
         data = study.data
         return (
             f"{study.name}: {len(data.files)} files, {len(data.sensors)} sensors, {len(data.training)} training and "
-            f"{len(data.validation)} validation trajectories"
+            f"{len(data.validation)} validation trajectories, load inputs: {', '.join(study.load_inputs) or 'none'}"
         )
     ringdowns = study.ringdowns
     training, validation = (len(ringdowns.training), len(ringdowns.validation)) if ringdowns else (0, 0)

@@ -12,6 +12,7 @@ from romgen.cli.options import Force, Json, Quiet, RunDir, StudyPath, open_study
 from romgen.cli.output import Output
 from romgen.cli.run import bring_up_to_date, read_summary, stability_line
 from romgen.fmu.model_file import model_json
+from romgen.forcing_stages import last_model_stage
 from romgen.pipeline import reduced_model
 from romgen.polar_form import polar_text
 from romgen.store import replace_atomically
@@ -31,7 +32,7 @@ def learn(
     """Run up to the reduced model; print its errors and its polar form."""
     study, out = open_study(study_path), Output(quiet=quiet, as_json=json_output)
     folder = run_folder(study, run_dir)
-    result = bring_up_to_date(study, folder, out, until="learn", force=force)
+    result = bring_up_to_date(study, folder, out, until=last_model_stage(study), force=force)
     part = read_summary(folder)["learn"]
     rows = [
         (name, role, f"{error:.3f}") for role, errors in part["nmte_percent"].items() for name, error in errors.items()

@@ -66,7 +66,7 @@ def interface_options(model: ReducedModel, settings: FmuSettings, info: FmuInfo)
     share = None
     if settings.absolute:
         if BASE_ACCELERATION not in model.inputs:
-            advice = "leave [fmu] absolute out, or give [base_acceleration]"
+            advice = "leave [fmu] absolute out, or give [base_acceleration] ([forcing.base_acceleration] for data)"
             raise InputError("absolute outputs need motion of the base", where="[fmu] absolute", advice=advice)
         given = info.base_share or (1.0,) * len(model.sensors)
         if len(given) != len(model.sensors):

@@ -12,6 +12,7 @@ from romgen.arrays import BoolArray, FloatArray
 from romgen.backbone import Backbone
 from romgen.forced_curve import ForcedCurve, ForcedResponse
 from romgen.forced_validation import ForcedPoint
+from romgen.load_calibration import CalibratedPoint, InputLoad
 from romgen.reduced_model import ReducedModel
 from romgen.report.backbone_figures import MEASURE_NAMES, backbone_amplitude
 from romgen.report.blocks import FigureBlock, TableBlock
@@ -57,7 +58,7 @@ def _level_colours(curves: Sequence[ForcedCurve]) -> dict[float, str]:
     return {level: CYCLE[k % len(CYCLE)] for k, level in enumerate(levels)}
 
 
-def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool, with_points: bool) -> None:
+def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool, crosses: Sequence[str]) -> None:
     """Levels by colour, the rest by line style."""
     colours = _level_colours(curves)
     unit = unit_text(curves[0].unit)
@@ -67,15 +68,18 @@ def _legend(axes: Axes, curves: Sequence[ForcedCurve], with_backbone: bool, with
         Line2D([], [], color=GREY, linestyle="--", label="unstable"),
     ]
     handles.append(Line2D([], [], color=GREY, marker="o", mfc="white", linestyle="", label="fold"))
-    if with_points:
-        handles.append(Line2D([], [], color=GREY, marker="x", mew=2.0, linestyle="", label="finite elements"))
+    markers = {"finite elements": "x", "measured": "+"}
+    handles += [Line2D([], [], color=GREY, marker=markers[c], mew=2.0, linestyle="", label=c) for c in crosses]
     if with_backbone:
         handles.append(Line2D([], [], color=BLACK, linestyle=":", label="backbone"))
     axes.legend(handles=handles, loc="upper right")
 
 
 def response_figure(
-    response: ForcedResponse, backbones: tuple[Backbone, ...], points: tuple[ForcedPoint, ...] = ()
+    response: ForcedResponse,
+    backbones: tuple[Backbone, ...],
+    points: tuple[ForcedPoint, ...] = (),
+    loads: tuple[InputLoad, ...] = (),
 ) -> FigureBlock:
     """Displacement amplitude against forcing frequency at all levels, backbones overlaid.
 
@@ -84,6 +88,7 @@ def response_figure(
     response : curves of all levels.
     backbones : only those inside the drawn frequencies are shown.
     points : full finite-element runs, drawn as crosses.
+    loads : calibrated inputs; their measured points on the drawn curves are marked.
     """
     figure = new_figure(4.4)
     axes = figure.add_subplot()
@@ -94,19 +99,31 @@ def response_figure(
         tables.append(_table(response, curve))
     for point in points:
         axes.plot(point.frequency_hz, 1e3 * point.fe_m, "x", color=colours[point.load], markersize=8, mew=2.0)
+    measured = _measured(response, loads)
+    for at in measured:
+        axes.plot(at.frequency_hz, 1e3 * at.measured_m, "+", color=colours[at.level], markersize=10, mew=2.0)
     axes.set_xlim(*_window(response))
     axes.set_ylim(bottom=0.0)
     drawn = [curve for curve in backbones if _overlay(axes, curve, response)]
-    _legend(axes, response.curves, bool(drawn), bool(points))
+    _legend(axes, response.curves, bool(drawn), ("finite elements",) * bool(points) + ("measured",) * bool(measured))
     measure = MEASURE_NAMES[response.measure]
     label(axes, "forcing frequency [Hz]", f"{measure} of {response.sensor} [mm]", "frequency response")
     caption = (
         f"Forced response of the reduced model: amplitude of sensor “{response.sensor}” ({measure} over one period, "
         "about the rest state, mean not removed). The level is the peak value of a cosine on the input. Solid: stable; "
-        "dashed: unstable; circles: folds, where a sweep jumps; crosses: finite elements; thin: beyond the trained "
-        "range. Shaded: amplitudes that the first backbone reaches inside the trained range."
+        "dashed: unstable; circles: folds, where a sweep jumps; crosses: finite elements; plus signs: measured points "
+        "that the load was calibrated on; thin: beyond the trained range. Shaded: amplitudes that the first backbone "
+        "reaches inside the trained range."
     )
     return FigureBlock("frequency_response", figure, caption, tuple(tables))
+
+
+def _measured(response: ForcedResponse, loads: tuple[InputLoad, ...]) -> list[CalibratedPoint]:
+    """The measured points of the drawn input, sensor, measure and levels."""
+    levels, drawn = {curve.level for curve in response.curves}, response.curves[0].input
+    points = [point for load in loads if load.input == drawn for point in load.points]
+    same = [p for p in points if (p.sensor, p.measure) == (response.sensor, response.measure)]
+    return [point for point in same if point.level in levels]
 
 
 def _window(response: ForcedResponse) -> tuple[float, float]:

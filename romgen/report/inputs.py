@@ -15,6 +15,7 @@ from romgen.fmu.records import FmuCheck, FmuExport, FmuLevels
 from romgen.forced_curve import ForcedResponse
 from romgen.forced_validation import ForcedPoint
 from romgen.lifted_orbit import Measure
+from romgen.load_calibration import InputLoad
 from romgen.load_histories import HistoryComparison
 from romgen.provenance import Provenance
 from romgen.reduced_model import ReducedModel
@@ -86,6 +87,7 @@ class ReportInputs:
     resonance_reason : one sentence on how the kept terms were chosen.
     coefficient_deviation : (m, n_term) 1/s, standard deviation of abs of each normal-form coefficient.
     orders : the polynomial orders that were tried.
+    loads : load inputs of a model of recorded data.
     forced : frequency response at all levels.
     forced_points : points of it that the finite-element model computed too.
     histories : load histories that both models followed.
@@ -114,6 +116,7 @@ class ReportInputs:
     resonance_reason: str = ""
     coefficient_deviation: FloatArray | None = None
     orders: tuple[OrderTrial, ...] = ()
+    loads: tuple[InputLoad, ...] = ()
     forced: ForcedResponse | None = None
     forced_points: tuple[ForcedPoint, ...] = ()
     histories: tuple[HistoryComparison, ...] = ()

@@ -15,6 +15,7 @@ from romgen.report.cost_figures import cost_figure, cost_table
 from romgen.report.fmu_tables import check_table, export_table, levels_table, problem_listing, replay_table
 from romgen.report.forced_figures import modal_figure, response_figure, response_table
 from romgen.report.forced_points import forced_points_figure, forced_points_table
+from romgen.report.forcing_tables import calibration_table, load_table
 from romgen.report.history_figures import history_figure, history_table
 from romgen.report.inputs import ReportInputs
 from romgen.report.instantaneous_figures import instantaneous_figure, long_enough
@@ -122,6 +123,14 @@ def model_section(inputs: ReportInputs) -> Section | None:
     return Section("model", "Reduced model", blocks)
 
 
+def forcing_section(inputs: ReportInputs) -> Section | None:
+    """Load inputs that were calibrated or given."""
+    if not inputs.loads:
+        return None
+    tables = tuple(calibration_table(load) for load in inputs.loads if load.points)
+    return Section("forcing", "Load inputs", (load_table(inputs.loads), *tables))
+
+
 def forced_section(inputs: ReportInputs) -> Section | None:
     """Frequency response at all levels."""
     response = inputs.forced
@@ -132,7 +141,7 @@ def forced_section(inputs: ReportInputs) -> Section | None:
     checked: tuple[Block, ...] = ()
     if inputs.forced_points:
         checked = (forced_points_table(inputs.forced_points), forced_points_figure(inputs.forced_points))
-    figure = response_figure(response, inputs.backbones, inputs.forced_points)
+    figure = response_figure(response, inputs.backbones, inputs.forced_points, inputs.loads)
     blocks = (figure, *checked, response_table(response), *modal, *notes)
     return Section("forced", "Forced response", blocks)
 
@@ -215,6 +224,7 @@ BUILDERS: tuple[Callable[[ReportInputs], Section | None], ...] = (
     spectrogram_section,
     model_section,
     energy_section,
+    forcing_section,
     forced_section,
     history_section,
     backbone_section,

@@ -18,6 +18,7 @@ from romgen.settings.finite_elements import (
     RingDownStart,
     SensorSettings,
 )
+from romgen.settings.forcing import ForcedPointSettings, ForcingSettings
 from romgen.settings.joints import (
     BoltSettings,
     ContactSettings,
@@ -52,8 +53,10 @@ __all__ = [
     "Estimate",
     "ExcitationSettings",
     "FmuSettings",
+    "ForcedPointSettings",
     "ForcedResponseSettings",
     "ForcedValidationSettings",
+    "ForcingSettings",
     "FoundationSettings",
     "LearnSettings",
     "LoadHistorySettings",

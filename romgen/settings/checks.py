@@ -26,7 +26,8 @@ SAME_MIX = np.cos(np.deg2rad(1.0))
 
 def study_problems(study: Study) -> tuple[str, ...]:
     """Return one line per thing that the study names but does not have, or contradicts."""
-    checks = (_data_problems(study.data),) if study.data is not None else _model_checks(study)
+    data = study.data
+    checks = _model_checks(study) if data is None else (_data_problems(data), _forcing_problems(study, data.sensors))
     problems = [problem for check in checks for problem in check]
     return (*problems, *_learn_problems(study), *_downstream_problems(study))
 
@@ -206,6 +207,30 @@ def _data_problems(data: DataSettings) -> Iterator[str]:
         yield f"[data] sensors must differ; got {', '.join(data.sensors)}"
 
 
+def _forcing_problems(study: Study, sensors: tuple[str, ...]) -> Iterator[str]:
+    count = len(study.learn.master_modes)
+    for name, table in study.forcing.items():
+        where = f"[forcing.{name}]"
+        if not _IDENTIFIER.fullmatch(name):
+            yield f"{where} the name becomes a variable of the FMU: letters, digits and underscores; got '{name}'"
+        if name in sensors:
+            yield f"{where} the name is taken by a sensor; choose another"
+        if any(mode > count for mode in table.modes):
+            yield f"{where} modes are numbered from 1 to the {count} of [learn] master_modes; got {list(table.modes)}"
+        for k, point in enumerate(table.points, 1):
+            if point.sensor not in sensors:
+                yield unknown(f"{where} sensor of point {k}:", "sensor", point.sensor, sensors)
+            if point.mode is not None and point.mode > count:
+                yield f"{where} mode of point {k}: [learn] master_modes has {count} modes; got {point.mode}"
+        for sensor, shares in table.participation.items():
+            if sensor not in sensors:
+                yield unknown(f"{where} participation:", "sensor", sensor, sensors)
+            if len(shares) != count:
+                yield f"{where} participation of {sensor}: one number per master mode ({count}); got {len(shares)}"
+        if table.participation and not any(any(shares) for shares in table.participation.values()):
+            yield f"{where} participation is zero for all modes: the input would drive nothing"
+
+
 def _learn_problems(study: Study) -> Iterator[str]:
     learn = study.learn
     if len(set(learn.master_modes)) < len(learn.master_modes) or not learn.master_modes:
@@ -221,7 +246,9 @@ def _downstream_problems(study: Study) -> Iterator[str]:
     forced, known = study.forced_response, study.sensor_names
     if forced.sensor is not None and forced.sensor not in known:
         yield unknown("[forced_response] sensor:", "sensor", forced.sensor, known)
-    if forced.levels and forced.input not in study.load_inputs:
+    if forced.levels and study.data is not None and not study.forcing:
+        yield f"[forced_response] levels need a load input, which data do not have; add [forcing.{forced.input}]"
+    elif forced.levels and forced.input not in study.load_inputs:
         yield unknown("[forced_response] input:", "load input", forced.input, study.load_inputs)
     if study.forced_validation is not None and (study.data is not None or not forced.levels):
         yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"

@@ -20,6 +20,7 @@ from romgen.settings.finite_elements import (
     RingDownSettings,
     SensorSettings,
 )
+from romgen.settings.forcing import ForcingSettings
 from romgen.settings.joints import (
     BoltSettings,
     ContactSettings,
@@ -73,6 +74,7 @@ class Study(Settings):
     excitations: dict[str, ExcitationSettings] = Field(default_factory=dict)
     ringdowns: RingDownSettings | None = None
     data: DataSettings | None = None
+    forcing: dict[str, ForcingSettings] = Field(default_factory=dict)
     learn: LearnSettings = LearnSettings()
     forced_response: ForcedResponseSettings = ForcedResponseSettings()
     forced_validation: ForcedValidationSettings | None = None
@@ -86,6 +88,8 @@ class Study(Settings):
         bodies = bool(self.blocks or self.meshes)
         if self.data is not None and (bodies or self.ringdowns is not None):
             raise ValueError("has both [data] and a finite-element model; keep one of them")
+        if self.forcing and self.data is None:
+            raise ValueError("has [forcing] but no [data]: a finite-element model computes its loads; remove the table")
         if self.data is None and not bodies:
             raise ValueError("has neither [data] nor [blocks.<name>] or [meshes.<name>]; add one of them")
         if bodies and self.ringdowns is None:
@@ -109,7 +113,8 @@ class Study(Settings):
     def load_inputs(self) -> dict[str, str]:
         """Names of the load inputs and their SI units: the acceleration of the base first."""
         base = {} if self.base_acceleration is None else {BASE_ACCELERATION: "m/s2"}
-        return base | {name: table.unit for name, table in self.excitations.items()}
+        known = {name: "m/s2" if name == BASE_ACCELERATION else "N" for name in self.forcing}
+        return base | {name: table.unit for name, table in self.excitations.items()} | known
 
     @property
     def sensor_names(self) -> tuple[str, ...]:

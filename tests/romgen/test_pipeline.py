@@ -107,8 +107,8 @@ def test_tables_reach_exactly_the_stages_that_use_them() -> None:
     study = Study.model_validate({**STUDY, "forced_validation": {}, "load_histories": {"pulse": pulse}})
     stages = {stage.name: stage for stage in stages_of(study)}
     used = {table.split(".")[0] for name, stage in stages.items() if name != "provenance" for table in stage.tables}
-    # the report states what [report] and [acceptance] say, through the provenance of the whole study
-    assert set(Study.model_fields) - used == {"data", "report", "acceptance"}
+    # a model has neither data nor their loads; the report reads [report] and [acceptance] from the whole study
+    assert set(Study.model_fields) - used == {"data", "forcing", "report", "acceptance"}
     for stage in stages.values():
         assert set(stage.upstream) <= set(stages)
 

@@ -11,6 +11,7 @@ from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.backbone import backbone
 from romgen.fmu.records import FmuCheck, FmuExport
 from romgen.forced_response import forced_response
+from romgen.load_calibration import CalibratedPoint, InputLoad
 from romgen.load_histories import HistoryComparison, compare_history
 from romgen.polynomial import PolynomialMap
 from romgen.provenance import collect_provenance
@@ -20,6 +21,30 @@ from romgen.settings import ForcedResponseSettings, LoadHistorySettings
 from romgen.structure import EnergyLedger, FrequencyRatio, Interface, Modes, Preload, RingDown, StepEffort, Structure
 from romgen.trajectory import Trajectory
 
+PEAK = CalibratedPoint(
+    level=2.0,
+    unit="m/s2",
+    frequency_hz=109.1,
+    peak=True,
+    resonance_hz=109.3,
+    sensor="mid",
+    measure="sqrt2_rms",
+    measured_m=0.3e-3,
+    model_m=float("nan"),
+    level_needed=2.05,
+    deviation_percent=2.5,
+    expected_percent=2.8,
+    by_amplitude=1.0,
+    by_frequency=0.0,
+    input_change_percent=0.4,
+    mode=1,
+    distance=1.1,
+    stable=False,
+)
+LOADS = (
+    InputLoad("base_acceleration", "m/s2", "points", np.array([-1.3, 0.0]), np.array([2.8, np.nan]), 2.5, (PEAK,), ()),
+    InputLoad("hammer", "N", "participation", np.array([0.8, 0.1]), np.full(2, np.nan), float("nan"), (), ()),
+)
 # Local corners and edge midpoints of the 20-node hexahedron on the grid 0, 1, 2, VTK order.
 HEX20_CORNERS = ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2))
 HEX20_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
@@ -211,6 +236,7 @@ def full_inputs(
         resonance_reason="exact 1:2 combinations",
         coefficient_deviation=0.01 * np.abs(model.normal_form.coefficients),
         orders=(OrderTrial(3, 6.0, False), OrderTrial(5, 2.9, True)),
+        loads=LOADS,
         forced=forced_response(model, ForcedResponseSettings(levels=(1.0, 2.0), sensor="mid")),
         histories=(_history(model),),
         backbones=(backbone(model, 0), backbone(model, 0, slaved=True), backbone(model, 1)),

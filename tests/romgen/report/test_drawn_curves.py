@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -12,6 +14,7 @@ from romgen.jackknife import Replicates
 from romgen.report import ReportInputs
 from romgen.report.backbone_figures import backbone_figure
 from romgen.report.forced_figures import modal_figure, response_figure
+from romgen.report.forcing_tables import calibration_table, load_table
 from romgen.report.ringdown_figures import cycle_s, energy_figure, ringdown_figure
 from romgen.report.style import house_style
 
@@ -112,3 +115,25 @@ def test_cycle_of_a_cosine() -> None:
     t = np.linspace(0.0, 1.0, 5001)
     assert cycle_s(t, np.cos(2 * np.pi * 40.0 * t)) == pytest.approx(1 / 40.0, abs=2e-4 / 38)
     assert cycle_s(t, np.ones_like(t)) == pytest.approx(1.0)
+
+
+def test_measured_points_lie_on_the_frequency_response(full_inputs: ReportInputs) -> None:
+    """Only those of the drawn input, sensor, measure and level."""
+    response, (base, hammer) = full_inputs.forced, full_inputs.loads
+    assert response is not None
+    point = base.points[0]
+    others = (replace(point, level=3.0), replace(point, sensor="lower"), replace(point, measure="max"))
+    with house_style():
+        block = response_figure(response, (), (), (replace(base, points=(point, *others)), hammer))
+    marked = [line.get_xydata() for line in block.figure.axes[0].get_lines() if line.get_marker() == "+"]
+    np.testing.assert_allclose(np.concatenate(marked), [[point.frequency_hz, 1e3 * point.measured_m]])
+
+
+def test_calibration_table_names_what_is_wrong_with_a_point(full_inputs: ReportInputs) -> None:
+    base, hammer = full_inputs.loads
+    row = calibration_table(base).rows[0]
+    assert row[-1] == "peak of the response, outside the trained range, not stable"
+    assert "none" in row  # no state of the model near the measurement at this level
+    loads = load_table((base, hammer)).rows
+    assert [cells[1] for cells in loads] == ["1 measured point", "given participation"]
+    assert loads[0][3] == "2.8, -"

@@ -109,6 +109,7 @@ ABSENT = {
     "spectrogram": {"model": None},
     "energy": {"ring_downs": ()},
     "model": {"model": None},
+    "forcing": {"loads": ()},
     "forced": {"forced": None},
     "histories": {"histories": ()},
     "backbone": {"backbones": ()},

@@ -129,6 +129,7 @@ MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_set("fmu", to={"icon": "study.toml"}), "[fmu] icon: importers show PNG images only"),
     (_set("data", to={"files": ["a.mat"], "sensors": ["a"], "training": [0]}), "both [data] and a finite-element"),
     (_without("ringdowns"), "has [blocks] or [meshes] but no [ringdowns]"),
+    (_set("forcing", to={"shaker": {"participation": {"tip": [1.0, 0.0]}}}), "has [forcing] but no [data]"),
     (_set("blocks", to={}), "has neither [data] nor [blocks.<name>]"),
 ]
 
@@ -142,6 +143,83 @@ def test_mistake_is_one_line(
     assert any(expected in line for line in found), found
     assert all("\n" not in line and line.startswith("study.toml: ") for line in found)
     assert not any("pydantic" in line or "Value error" in line for line in found)
+
+
+PEAK = {"level": 2.0, "sensor": "mid", "amplitude": 1e-3}
+FORCING_MISTAKES: list[tuple[str, dict[str, Any], str]] = [
+    ("shaker", {}, "[forcing.shaker] needs either points (measured) or participation (known)"),
+    ("shaker", {"points": [PEAK], "participation": {"mid": [1, 0]}}, "needs either points (measured) or participation"),
+    ("shaker", {"points": [PEAK], "sing": 1}, "[forcing.shaker] unknown key 'sing'; did you mean 'sign'?"),
+    (
+        "shaker",
+        {"points": [{**PEAK, "level": 0.0}]},
+        "[forcing.shaker.points[0]] level: Input should be greater",
+    ),
+    ("shaker", {"points": [{**PEAK, "amplitude": -1.0}]}, "amplitude: Input should be greater than 0; got -1.0"),
+    (
+        "shaker",
+        {"points": [{**PEAK, "amplitude": "1 furlong"}]},
+        "amplitude: unknown unit 'furlong', accepted are m",
+    ),
+    ("shaker", {"points": [{**PEAK, "frequency_hz": 0.0}]}, "frequency_hz: Input should be greater than 0"),
+    ("shaker", {"points": [{**PEAK, "measure": "rms"}]}, "measure: Input should be 'max' or 'sqrt2_rms'; got 'rms'"),
+    ("shaker", {"points": [{"level": 2.0, "sensor": "mid"}]}, "[forcing.shaker.points[0]] missing key 'amplitude'"),
+    ("shaker", {"points": [{**PEAK, "sensor": "mit"}]}, "sensor of point 1: unknown sensor 'mit'; did you mean 'mid'?"),
+    ("shaker", {"points": [{**PEAK, "mode": 3}]}, "mode of point 1: [learn] master_modes has 2 modes; got 3"),
+    (
+        "shaker",
+        {"points": [{**PEAK, "mode": 1, "frequency_hz": 9.0}]},
+        "mode says whose peak a point without",
+    ),
+    ("shaker", {"points": [PEAK], "modes": [1, 2]}, "needs at least one point per loaded mode; got 1 for 2"),
+    ("shaker", {"points": [PEAK, PEAK], "modes": [1, 1]}, "modes must differ; got [1, 1]"),
+    ("shaker", {"points": [PEAK], "modes": [3]}, "modes are numbered from 1 to the 2 of [learn] master_modes; got [3]"),
+    ("shaker", {"points": [PEAK], "sign": 2}, "sign: Input should be -1 or 1; got 2"),
+    ("shaker", {"participation": {"mid": [1.0]}}, "participation of mid: one number per master mode (2); got 1"),
+    ("shaker", {"participation": {"top": [1.0, 0.0]}}, "participation: unknown sensor 'top'; known are lower, mid"),
+    (
+        "shaker",
+        {"participation": {"mid": [0, 0]}},
+        "participation is zero for all modes",
+    ),
+    ("shaker", {"participation": {"mid": [1, 0]}, "modes": [1]}, "modes and sign go with points"),
+    ("mid", {"points": [PEAK]}, "[forcing.mid] the name is taken by a sensor; choose another"),
+    ("sha ker", {"points": [PEAK]}, "the name becomes a variable of the FMU: letters, digits and underscores; got"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "expected"), FORCING_MISTAKES, ids=[line[:40] for *_, line in FORCING_MISTAKES]
+)
+def test_mistake_in_a_load_of_data_is_one_line(tmp_path: Path, name: str, table: dict[str, Any], expected: str) -> None:
+    (tmp_path / "a.mat").write_bytes(b"x")
+    data = {"files": ["a.mat"], "sensors": ["lower", "mid"], "training": [0]}
+    found = problems(tmp_path, {"study": {"name": "lab"}, "data": data, "forcing": {name: table}})
+    assert len(found) == 1, found
+    assert expected in found[0]
+    assert "\n" not in found[0]
+
+
+def test_levels_without_a_load_say_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "a.mat").write_bytes(b"x")
+    data = {"files": ["a.mat"], "sensors": ["mid"], "training": [0]}
+    found = problems(tmp_path, {"study": {"name": "lab"}, "data": data, "forced_response": {"levels": [1.0]}})
+    assert len(found) == 1
+    assert (
+        "[forced_response] levels need a load input, which data do not have; add [forcing.base_acceleration]"
+        in found[0]
+    )
+
+
+def test_loads_of_data_are_inputs(tmp_path: Path) -> None:
+    (tmp_path / "a.mat").write_bytes(b"x")
+    data = {"files": ["a.mat"], "sensors": ["lower", "mid"], "training": [0]}
+    forcing = {"base_acceleration": {"points": [{**PEAK, "amplitude": "0.62 mm"}]}, "hammer": {"points": [PEAK]}}
+    path = tmp_path / "study.toml"
+    path.write_text(toml_text({"study": {"name": "lab"}, "data": data, "forcing": forcing}), encoding="utf-8")
+    study = load_study(path)
+    assert study.load_inputs == {"base_acceleration": "m/s2", "hammer": "N"}
+    assert study.forcing["base_acceleration"].points[0].amplitude == pytest.approx(0.62e-3)
 
 
 def test_all_problems_are_listed(tmp_path: Path, tables: dict[str, Any]) -> None:
