@@ -31,6 +31,8 @@ BAND = (0.5, 1.5)
 # z'/z counts alike at all amplitudes above this share of the largest: phase drift is what the start must get right.
 AMPLITUDE_FLOOR = 0.06
 EDGE_PERIODS = 1.0
+# Small: every mode below this share of its largest amplitude, for so many periods of the slowest mode together.
+SMALL, SMALL_PERIODS = 0.15, 20.0
 SAMPLES_PER_PERIOD = 6.0
 
 
@@ -43,11 +45,13 @@ class Start:
     dynamics : the linear part they belong to.
     signals : z (n_time, m) per motion.
     edge : samples at both ends of each motion in which they are distorted.
+    direct : the direct fit that they come from; None where they are band-passed.
     """
 
     dynamics: ReducedDynamics
     signals: tuple[ComplexArray, ...] = field(metadata={"unit": "1", "axes": "time,mode"})
     edge: tuple[int, ...]
+    direct: NormalFormFit | None = None
 
 
 def band_passed(dynamics: ReducedDynamics, training: Sequence[ReducedTrajectory]) -> Start:
@@ -67,7 +71,7 @@ def band_passed(dynamics: ReducedDynamics, training: Sequence[ReducedTrajectory]
 def charted(fit: NormalFormFit, training: Sequence[ReducedTrajectory]) -> Start:
     """Return z of the inverse chart of a direct fit."""
     signals = tuple(evaluate(fit.inverse_chart, r.y / fit.dynamics.scale) for r in training)
-    return Start(fit.dynamics, signals, (0,) * len(training))
+    return Start(fit.dynamics, signals, (0,) * len(training), fit)
 
 
 def start_model(
@@ -80,8 +84,12 @@ def start_model(
 ) -> RefinedDynamics:
     """Return Lambda and B of the signals, the linear displacement of the modes, and no further terms.
 
+    Lambda is tied to the linear part of the direct fit, or to small amplitudes of the band-passed signals;
     ``keep_linear`` keeps the eigenvalues of the start here and in the refinement.
     """
+    reference = start.dynamics.eigenvalues
+    if start.direct is None:
+        reference = small_eigenvalues(start, training, kept, table, keep_linear=keep_linear)
     dynamics, m = start.dynamics, len(start.dynamics.eigenvalues)
     eigenvalues, B = rates(start, training, kept, table, keep_linear=keep_linear)
     # w = 2 Re(V q), so eta_j = s_j Re(2 V_jj z_j) and the rest
@@ -89,7 +97,7 @@ def start_model(
     output = output_map(linear.astype(np.complex128), table)
     return RefinedDynamics(
         eigenvalues=eigenvalues,
-        reference=eigenvalues,
+        reference=reference,
         keep_linear=keep_linear,
         amplitude=np.max([np.abs(z[keep]).max(axis=0) for z, keep in zip(start.signals, kept, strict=True)], axis=0),
         exponents=table.exponents,
@@ -110,7 +118,37 @@ def rates(
     keep_linear: bool,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return Lambda and B of z' = Lambda z + B phi(z) by regression with weights 1/(abs(z_j) + floor)."""
+    return _regression(start, _samples(start, training, kept), table, keep_linear=keep_linear)
+
+
+def small_eigenvalues(
+    start: Start,
+    training: Sequence[ReducedTrajectory],
+    kept: Sequence[BoolArray],
+    table: ResonanceTable,
+    *,
+    keep_linear: bool,
+) -> ComplexArray:
+    """Return Lambda (m,) by the regression of ``rates`` over the samples in which all modes are small.
+
+    Over all amplitudes the linear part of a polynomial of low degree bends towards the large ones. Band-passed signals
+    have no rest position in them, which counts where motions are small. Motions that end before SMALL_PERIODS, or that
+    do not decay there, leave the regression over all samples.
+    """
     Z, Z_dot = _samples(start, training, kept)
+    small = (np.abs(Z) <= SMALL * np.abs(Z).max(axis=0)).all(axis=1)
+    slowest = 2.0 * np.pi / float(start.dynamics.eigenvalues.imag.min())
+    if small.sum() * min(float(r.t[1] - r.t[0]) for r in training) >= SMALL_PERIODS * slowest:
+        eigenvalues = _regression(start, (Z[small], Z_dot[small]), table, keep_linear=keep_linear)[0]
+        if np.all(eigenvalues.real < 0.0):
+            return eigenvalues
+    return _regression(start, (Z, Z_dot), table, keep_linear=keep_linear)[0]
+
+
+def _regression(
+    start: Start, samples: tuple[ComplexArray, ComplexArray], table: ResonanceTable, *, keep_linear: bool
+) -> tuple[ComplexArray, ComplexArray]:
+    Z, Z_dot = samples
     B = np.zeros(table.resonant.shape, dtype=np.complex128)
     eigenvalues = start.dynamics.eigenvalues.copy()
     for j, terms_kept in enumerate(table.resonant):

@@ -12,13 +12,13 @@ from romgen.chart import ReducedTrajectory
 from romgen.differences import is_uniform
 from romgen.dissipative_fit import dissipative
 from romgen.jackknife import Replicates, blocks_of
-from romgen.normal_form import NormalFormFit, Resonance, resonance_table
-from romgen.reduced_dynamics import LinearPart, fit_reduced_dynamics
+from romgen.normal_form import NormalFormFit, Resonance, fit_normal_form, resonance_table, with_replicates
+from romgen.reduced_dynamics import LinearPart
 from romgen.refined_chart import refined_normal_form
 from romgen.refined_dynamics import RefinedDynamics, Segment
 from romgen.refinement import refine, regrown, replicates
 from romgen.resonance import ResonanceTable
-from romgen.shooting_start import Start, band_passed, rates, segments, start_model
+from romgen.shooting_start import Start, band_passed, charted, segments, small_eigenvalues, start_model
 
 START_ORDER = 3
 MIN_PERIODS = 20.0
@@ -26,6 +26,8 @@ MIN_PERIODS = 20.0
 # of the cross-validation make one, so every segment has samples that count.
 SHOTS, SHOT_ORDER = 4, 5
 SHOT_STEPS, SHOT_DECREASE = 12, 1e-3
+# Cost of the shooting from the direct fit, relative to that from band-passed signals, below which it is taken.
+IMPROVED = 0.9
 STEPS, DECREASE = 30, 1e-4
 # Internal steps: at least so many per period of the fastest mode, and the largest turn of a detuned term within one in
 # radians, which leaves 2e-5 of that term.
@@ -67,7 +69,7 @@ def fit_on_trajectories(
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
     last = next(_grown(training, everything, (order,), (internal_resonance, ridge, known)))
     table = resonance_table(last.start.dynamics.eigenvalues, min(order, START_ORDER), internal_resonance)
-    references = _references(training, last.start, table, keep_linear=known is not None)
+    references = _references(training, last.start, table, (ridge, known is not None))
     others = replicates(last.model, last.segments, last.max_step, references)
     spread = Replicates(np.array([o.eigenvalues for o in others]), np.array([o.B for o in others]))
     return replace(last.normal_form(ridge), replicates=spread)
@@ -126,26 +128,53 @@ def _grown(
     orders: Sequence[int],
     settings: tuple[Resonance, float, LinearPart | None],
 ) -> Iterator[_Refined]:
-    internal_resonance, ridge, known = settings
+    internal_resonance = settings[0]
     grown = sorted({*growing_orders(orders[0]), *orders})
-    seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
-    dynamics = fit_reduced_dynamics(seen, min(grown[0], START_ORDER), ridge, known)
-    start = band_passed(dynamics, training)
-    table = resonance_table(dynamics.eigenvalues, grown[0], internal_resonance)
-    shooting = start_model(start, training, kept, table, keep_linear=known is not None)
-    shots, whole = segments(start, training, kept, SHOTS), segments(start, training, kept, 1)
+    start, shooting, shots = _best_start(training, kept, (min(grown[0], START_ORDER), grown[0]), settings)
+    dynamics = start.dynamics
+    whole = segments(start, training, kept, 1)
     first = [next(k for k, s in enumerate(shots) if s.motion == number) for number in range(len(training))]
     model = shooting
     for order in grown:
         table = resonance_table(dynamics.eigenvalues, order, internal_resonance)
         max_step = largest_resonant_step(dynamics.eigenvalues, table)
         if order <= SHOT_ORDER or order == grown[0]:
-            shooting, shots = refine(regrown(shooting, table), shots, max_step, SHOT_STEPS, SHOT_DECREASE)
+            if order > grown[0]:
+                shooting, shots = refine(regrown(shooting, table), shots, max_step, SHOT_STEPS, SHOT_DECREASE)
             model = shooting
             whole = tuple(replace(s, z0=shots[k].z0) for s, k in zip(whole, first, strict=True))
         model, whole = refine(regrown(model, table), whole, max_step, STEPS, DECREASE)
         if order in orders:
             yield _Refined(start, *dissipative(model, whole, max_step), table, max_step)
+
+
+def _best_start(
+    training: Sequence[ReducedTrajectory],
+    kept: Sequence[BoolArray],
+    orders: tuple[int, int],
+    settings: tuple[Resonance, float, LinearPart | None],
+) -> tuple[Start, RefinedDynamics, tuple[Segment, ...]]:
+    """Return the start from which multiple shooting comes to the lower cost on the samples that count.
+
+    The direct fit must win by a tenth: band-passed signals know the limit of small motions, which a cost of low order
+    does not value.
+
+    Parameters
+    ----------
+    orders : of the direct fit, which has the linear part of all starts; of the refinement.
+    """
+    internal_resonance, ridge, known = settings
+    seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
+    direct = fit_normal_form(seen, orders[0], internal_resonance, ridge, known)
+    table = resonance_table(direct.dynamics.eigenvalues, orders[1], internal_resonance)
+    max_step = largest_resonant_step(direct.dynamics.eigenvalues, table)
+    found = []
+    for start in (band_passed(direct.dynamics, training), charted(direct, training)):
+        model = start_model(start, training, kept, table, keep_linear=known is not None)
+        shots = segments(start, training, kept, SHOTS)
+        found.append((start, *refine(model, shots, max_step, SHOT_STEPS, SHOT_DECREASE)))
+    band, direct_start = found
+    return direct_start if direct_start[1].cost < IMPROVED * band[1].cost else band
 
 
 def largest_resonant_step(eigenvalues: ComplexArray, table: ResonanceTable) -> float:
@@ -164,10 +193,15 @@ def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:
 
 
 def _references(
-    training: Sequence[ReducedTrajectory], start: Start, table: ResonanceTable, *, keep_linear: bool
+    training: Sequence[ReducedTrajectory], start: Start, table: ResonanceTable, settings: tuple[float, bool]
 ) -> ComplexArray:
-    """Return the eigenvalues of the start without each block, (n_block, m): they come from the same data."""
+    """Return what the eigenvalues are tied to without each block, (n_block, m): it comes from the same data."""
+    ridge, keep_linear = settings
+    if start.direct is not None:
+        others = with_replicates(start.direct, training, ridge, keep_linear=keep_linear).replicates
+        assert others is not None
+        return others.eigenvalues
     block = blocks_of(training)
     ends = np.cumsum([len(r.t) for r in training])[:-1]
     kept = [np.split(block != b, ends) for b in range(block.max() + 1)]
-    return np.array([rates(start, training, masks, table, keep_linear=keep_linear)[0] for masks in kept])
+    return np.array([small_eigenvalues(start, training, masks, table, keep_linear=keep_linear) for masks in kept])
