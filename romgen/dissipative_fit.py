@@ -18,7 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from romgen.dissipation import SHELLS, demand
-from romgen.refinement import PRIOR_ERROR, RefinedDynamics, Segment, growth, linearise, moved, refine, simulated
+from romgen.refined_dynamics import RefinedDynamics, Segment, simulated
+from romgen.refinement import PRIOR_ERROR, growth, linearise, moved, refine
 from romgen.trained_range import trained_range
 
 STEPS, DECREASE = 15, 1e-4

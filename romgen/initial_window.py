@@ -8,10 +8,10 @@ from romgen.arrays import BoolArray, ComplexArray, FloatArray
 from romgen.chart import ReducedTrajectory
 from romgen.errors import NumericalError
 from romgen.etdrk4 import largest_step
-from romgen.polynomial import PolynomialMap, evaluate, jacobian, zeta
+from romgen.field_table import real_map
 from romgen.reduced_model import ReducedModel
 from romgen.simulate import chart_inverse
-from romgen.variational import sensitivities
+from romgen.variational import real_slopes, sensitivities
 
 # The window is this many periods of the slowest mode: beats of two modes need more than one.
 WINDOW_PERIODS = 3.0
@@ -86,12 +86,11 @@ def _misfit(
     m = len(z0)
     nf = (model.normal_form.exponents, model.normal_form.coefficients)
     none = np.zeros(0, dtype=np.int64)
-    z, S = sensitivities(r.t[window], z0, model.eigenvalues, nf, (none, none), largest_step(model.eigenvalues))
+    z, W = sensitivities(r.t[window], z0, model.eigenvalues, nf, (none, none), largest_step(model.eigenvalues))
     if not np.isfinite(z).all():
         return np.full(m * len(z), np.inf), np.zeros((m * len(z), 2 * m))
-    eta = PolynomialMap(model.chart.exponents, model.chart.coefficients[:m])
+    eta, s = real_map(model.chart.exponents, model.chart.coefficients[:m], z)
     unit = model.scale[:m] / model.scale[:m].max()
-    slope = jacobian(eta, zeta(z))
-    D = (slope[:, :, :m] @ S + slope[:, :, m:] @ S.conj()).real * unit[:, None]
-    misfit = (r.y[window, :m] / model.scale[:m] - evaluate(eta, zeta(z)).real) * unit
-    return misfit.ravel(), D.reshape(-1, 2 * m)
+    g = np.stack([unit[j] * real_slopes(s[:, j], W) for j in range(m)], axis=1)
+    misfit = (r.y[window, :m] / model.scale[:m] - eta.real) * unit
+    return misfit.ravel(), np.concatenate([g.real, -g.imag], axis=-1).reshape(-1, 2 * m)

@@ -115,6 +115,9 @@ def learning_summary(context: Context) -> dict[str, Any]:
             role: {e.name: e.first_sample_percent for e in errors} for role, errors in roles.items()
         },
         "rest_percent": {role: {e.name: e.rest_percent for e in errors} for role, errors in roles.items()},
+        "nmte_about_rest_percent": {
+            role: {e.name: e.about_rest_percent for e in errors} for role, errors in roles.items()
+        },
         "static_percent": {role: {e.name: e.static_percent for e in errors} for role, errors in roles.items()},
         "diverged_s": {role: {e.name: e.diverged_s for e in errors} for role, errors in roles.items()},
         "start_distance": {

@@ -21,7 +21,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from romgen.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from romgen.polynomial import exponents, monomial_gradient, monomials, zeta
+from romgen.compiled import compiled_unlocked
+from romgen.field_table import MonomialPlan, fill_monomials, monomial_plan, real_map
+from romgen.polynomial import exponents, monomials, zeta
 from romgen.resonance import ResonanceTable
 
 # Relative to the largest diagonal entry of the scaled normal equations: far above rounding, far below any penalty.
@@ -53,6 +55,8 @@ class ProjectedRow:
     C : (n_term,) complex, 0 where fixed; rest : (n_motion,) unit of eta.
     residual : (n_sample,) weighted data minus map.
     penalty : of C.
+    basis : columns of all rows (shared); own : those of this row; scale, factor : Cholesky factor of their scaled
+        normal equations.
     """
 
     C: ComplexArray = field(metadata={"unit": "unit of eta", "axes": "term"})
@@ -60,12 +64,13 @@ class ProjectedRow:
     residual: FloatArray = field(metadata={"unit": "1", "axes": "sample"})
     penalty: float
     basis: FloatArray = field(metadata={"unit": "1", "axes": "sample,unknown"})
+    own: IntArray = field(metadata={"unit": "1", "axes": "unknown"})
     scale: FloatArray = field(metadata={"unit": "mixed", "axes": "unknown"})
     factor: FloatArray = field(metadata={"unit": "1", "axes": "unknown,unknown"})
 
     def reduced(self, J: FloatArray) -> FloatArray:
         """Return J'J - J'M (M'M + R)^-1 M'J: the curvature that is left when C and rest follow."""
-        cross = (self.basis.T @ J) / self.scale[:, None]
+        cross = (self.basis.T @ J)[self.own] / self.scale[:, None]
         curvature: FloatArray = J.T @ J - cross.T @ cho_solve((self.factor, True), cross)
         return curvature
 
@@ -90,41 +95,71 @@ def output_map(linear: ComplexArray, table: ResonanceTable) -> OutputMap:
 
 
 def project(
-    output: OutputMap,
-    z: ComplexArray,
-    data: tuple[FloatArray, FloatArray, IntArray],
-    corner: FloatArray,
-    j: int,
-) -> ProjectedRow:
-    """Return the C and rest of row j that fit the data best.
+    output: OutputMap, z: ComplexArray, data: tuple[FloatArray, FloatArray, IntArray], corner: FloatArray
+) -> list[ProjectedRow]:
+    """Return the C and rest of every row that fit the data best.
 
     Parameters
     ----------
     z : (n_sample, m).
-    data : displacement of row j, weight, and number of the motion of each sample, (n_sample,) each.
+    data : displacement (n_sample, m), weight (n_sample,), and number of the motion of each sample (n_sample,).
     corner : (n_term,) penalty: adds corner^2 abs(C)^2 to the sum of squares; linear terms are free.
     """
-    x, share, motion = data
-    E = output.exponents[output.terms[j]]
-    m = z.shape[1]
-    own = (E[:, :m] == E[:, m:]).all(axis=1)
-    phi = monomials(zeta(z), E)
-    constants = (motion[:, None] == np.arange(motion.max() + 1)).astype(np.float64)
-    M = share[:, None] * np.hstack([phi.real, -phi.imag[:, ~own], constants])
-    weight = np.where(E.sum(axis=1) > 1, corner[output.terms[j]] ** 2, 0.0)
-    weights = np.concatenate([weight, weight[~own], np.zeros(constants.shape[1])])
-    normal = M.T @ M + np.diag(weights)
-    scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
-    normal = normal / np.outer(scale, scale) + JITTER * np.eye(len(scale))
-    factor = cho_factor(normal, lower=True)[0]
-    target = share * (x - (output.linear[j] * z[:, j]).real)
-    c = cho_solve((factor, True), M.T @ target / scale) / scale
-    C = np.zeros(len(output.exponents), dtype=np.complex128)
-    values = c[: len(E)].astype(np.complex128)
-    values[~own] += 1j * c[len(E) : len(c) - constants.shape[1]]
-    C[output.terms[j]] = values
-    rest = c[len(c) - constants.shape[1] :]
-    return ProjectedRow(C, rest, target - M @ c, float(weights @ c**2), M, scale, factor)
+    eta, share, motion = data
+    m, n_motion = z.shape[1], int(motion.max()) + 1
+    # the imaginary part of a product z_i conj z_i .. is 0
+    turning = np.flatnonzero((output.exponents[:, :m] != output.exponents[:, m:]).any(axis=1))
+    M = _design(zeta(z), (share, motion), monomial_plan(output.exponents), turning, n_motion)
+    normal = M.T @ M
+    rows = []
+    for j in range(m):
+        free = np.concatenate([output.terms[j], output.terms[j][turning], np.ones(n_motion, dtype=bool)])
+        penalised = np.where(output.exponents.sum(axis=1) > 1, corner**2, 0.0)
+        weights = np.concatenate([penalised, penalised[turning], np.zeros(n_motion)])
+        target = share * (eta[:, j] - (output.linear[j] * z[:, j]).real)
+        c, own, scale, factor = _solved(normal, M.T @ target, weights, np.flatnonzero(free))
+        n = len(output.exponents)
+        C = c[:n].astype(np.complex128)
+        C[turning] += 1j * c[n : n + len(turning)]
+        rest = c[n + len(turning) :]
+        rows.append(ProjectedRow(C, rest, target - M @ c, float(weights @ c**2), M, own, scale, factor))
+    return rows
+
+
+def _solved(
+    normal: FloatArray, right: FloatArray, weights: FloatArray, own: IntArray
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+    """Return c with (M'M + diag(weights)) c = right over the columns ``own``, 0 elsewhere, with its factor."""
+    H = normal[np.ix_(own, own)] + np.diag(weights[own])
+    scale = np.sqrt(np.maximum(np.diag(H), np.finfo(float).tiny))
+    H = H / np.outer(scale, scale) + JITTER * np.eye(len(scale))
+    factor = cho_factor(H, lower=True)[0]
+    c = np.zeros(len(right))
+    c[own] = cho_solve((factor, True), right[own] / scale) / scale
+    return c, own, scale, factor
+
+
+@compiled_unlocked
+def _design(
+    zeta: ComplexArray,
+    samples: tuple[FloatArray, IntArray],
+    plan: MonomialPlan,
+    turning: IntArray,
+    n_motion: int,
+) -> FloatArray:
+    """Return share times (Re phi, -Im phi of the turning terms, 1 of the own motion), (n_sample, n_unknown)."""
+    share, motion = samples
+    n_term, n_turning = plan.term.size, turning.size
+    M = np.zeros((len(zeta), n_term + n_turning + n_motion))
+    phi = np.empty(plan.parent.size, dtype=np.complex128)
+    for k in range(len(zeta)):
+        fill_monomials(zeta[k], plan.parent, plan.variable, phi)
+        for q in range(n_term):
+            M[k, q] = share[k] * phi[plan.term[q]].real
+        for q in range(n_turning):
+            M[k, n_term + q] = -share[k] * phi[plan.term[turning[q]]].imag
+        M[k, n_term + n_turning + motion[k]] = share[k]
+    return M
 
 
 def displacement(output: OutputMap, C: ComplexArray, z: ComplexArray) -> FloatArray:
@@ -135,9 +170,5 @@ def displacement(output: OutputMap, C: ComplexArray, z: ComplexArray) -> FloatAr
 
 def slopes(output: OutputMap, C: ComplexArray, z: ComplexArray) -> ComplexArray:
     """Return s (n_sample, m, m) with d eta_j = Re(sum_i s_ji dz_i), the conjugate part folded in."""
-    m = z.shape[1]
-    zz = zeta(z)
-    parts = [monomial_gradient(zz, output.exponents, i) @ C.T for i in range(2 * m)]
-    folded = np.stack([parts[i] + parts[m + i].conj() for i in range(m)], axis=-1)
-    total: ComplexArray = folded + np.diag(output.linear)
-    return total
+    s: ComplexArray = real_map(output.exponents, C, z)[1] + np.diag(output.linear)
+    return s

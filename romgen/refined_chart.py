@@ -12,7 +12,7 @@ from romgen.normal_form import NormalFormFit, relative_error_percent
 from romgen.output_map import OutputMap, slopes
 from romgen.polynomial import PolynomialMap, evaluate, exponents, monomials, zeta
 from romgen.reduced_dynamics import ReducedDynamics
-from romgen.refinement import RefinedDynamics, Segment, simulated
+from romgen.refined_dynamics import RefinedDynamics, Segment, simulated
 from romgen.regression import ridge_fit
 from romgen.resonance import ResonanceTable
 from romgen.trained_range import trained_range

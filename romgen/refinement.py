@@ -15,16 +15,15 @@ damping by less. Terms that no motion excites strongly stay small, and so does t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from romgen.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from romgen.dissipation import Demand, penalty
-from romgen.etdrk4 import march
-from romgen.output_map import OutputMap, ProjectedRow, output_map, project, slopes
+from romgen.arrays import ComplexArray, FloatArray
+from romgen.dissipation import penalty
+from romgen.output_map import ProjectedRow, output_map, project, slopes
+from romgen.refined_dynamics import RefinedDynamics, Segment, output_jacobian, segment_sensitivities, simulated
 from romgen.resonance import ResonanceTable
-from romgen.variational import sensitivities
 
 PRIOR_ERROR = 0.002
 # Standard deviations: of an eigenvalue as shares of Re and Im; of the rate that B adds at the corner as a share of the
@@ -38,53 +37,15 @@ FAR = 10.0
 
 
 @dataclass(frozen=True)
-class Segment:
-    """A stretch of a motion with its own initial state.
+class _Evaluated:
+    """A model with its motions, the eliminated displacement, and the cost; no rows where it is not finite."""
 
-    Attributes
-    ----------
-    t : (n_time,) s.
-    eta : (n_time, m) modal displacement of the data.
-    z0 : (m,) initial state of the model.
-    kept : (n_time,) samples that count; the others are held out.
-    motion : number of the motion it belongs to.
-    share : weight of a sample, one over the largest norm of eta of the motion, as in the NMTE.
-    """
-
-    t: FloatArray = field(metadata={"unit": "s", "axes": "time"})
-    eta: FloatArray = field(metadata={"unit": "unit of eta", "axes": "time,mode"})
-    z0: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
-    kept: BoolArray = field(metadata={"unit": "1", "axes": "time"})
-    motion: int
-    share: float
-
-
-@dataclass(frozen=True)
-class RefinedDynamics:
-    """Normal form and displacement map during refinement.
-
-    Attributes
-    ----------
-    eigenvalues : (m,) Lambda, 1/s; reference : (m,) the values they are tied to; keep_linear : they stay there.
-    amplitude : (m,) corner of the data, largest abs(z_j) over all motions.
-    exponents : (n_term, 2m) degree >= 2; resonant : (m, n_term) terms of B; B : (m, n_term) 1/s.
-    output : terms of the displacement; C : (m, n_output) their coefficients; rest : (n_motion, m) rest positions.
-    cost : relative mean square misfit with priors and penalty.
-    demand : where dissipation is demanded; None demands none.
-    """
-
-    eigenvalues: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
-    reference: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
-    amplitude: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
-    exponents: IntArray = field(metadata={"unit": "1", "axes": "term,variable"})
-    resonant: BoolArray = field(metadata={"unit": "1", "axes": "mode,term"})
-    B: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode,term"})
-    output: OutputMap
-    C: ComplexArray = field(metadata={"unit": "unit of eta", "axes": "mode,term"})
-    rest: FloatArray = field(metadata={"unit": "unit of eta", "axes": "motion,mode"})
-    cost: float = float("inf")
-    keep_linear: bool = False
-    demand: Demand | None = None
+    model: RefinedDynamics
+    segments: tuple[Segment, ...]
+    z: ComplexArray
+    rows: list[ProjectedRow]
+    norm: float
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -105,27 +66,24 @@ def refine(
     max_step : internal step of the simulation, s.
     decrease : relative decrease of the cost below which it has converged.
     """
-    segments = tuple(segments)
-    if not np.isfinite(_cost(model, segments, max_step)):
-        return model, segments
-    here = linearise(model, segments, max_step)
+    now = _evaluated(model, tuple(segments), max_step)
+    if not np.isfinite(now.cost):
+        return model, now.segments
     damping = 1e-3
     for _ in range(steps):
+        here = _normal_equations(now, segment_sensitivities(now.model, now.segments, max_step))
         for _ in range(MAX_REJECTIONS):
-            change = _step(here, damping)
-            trial_model, trial_segments = moved(here.model, segments, change)
-            cost = _cost(trial_model, trial_segments, max_step)
-            if cost < here.model.cost:
+            trial = _evaluated(*moved(here.model, now.segments, _step(here, damping)), max_step)
+            if trial.cost < now.cost:
                 break
             damping *= 8.0
         else:
             break
-        gain = (here.model.cost - cost) / here.model.cost
-        segments, damping = trial_segments, max(damping / 8.0, 1e-9)
-        here = linearise(trial_model, segments, max_step)
+        gain = (now.cost - trial.cost) / now.cost
+        now, damping = trial, max(damping / 8.0, 1e-9)
         if gain < decrease:
             break
-    return here.model, segments
+    return _with_output(now), now.segments
 
 
 def _step(here: _Linearised, damping: float) -> FloatArray:
@@ -149,7 +107,7 @@ def replicates(
     """
     blocks = len(references) // len(segments)
     segments = tuple(segments)
-    motion = _sensitivities(model, segments, max_step)
+    z, W = np.vstack(simulated(model, segments, max_step)), segment_sensitivities(model, segments, max_step)
     models = []
     for number, segment in enumerate(segments):
         of = np.arange(len(segment.t)) * blocks // len(segment.t)
@@ -157,7 +115,7 @@ def replicates(
             fewer = replace(segment, kept=segment.kept & (of != block))
             kept = (*segments[:number], fewer, *segments[number + 1 :])
             tied = replace(model, reference=references[number * blocks + block])
-            here = _normal_equations(tied, kept, motion)
+            here = _normal_equations(_projected(tied, kept, z), W)
             models.append(moved(model, kept, _step(here, 0.0))[0])
     return models
 
@@ -175,17 +133,6 @@ def regrown(model: RefinedDynamics, table: ResonanceTable) -> RefinedDynamics:
         C=np.pad(model.C, ((0, 0), (0, output.terms.shape[1] - model.C.shape[1]))),
         cost=float("inf"),
     )
-
-
-def simulated(model: RefinedDynamics, segments: Sequence[Segment], max_step: float) -> list[ComplexArray]:
-    """Return z (n_time, m) of each segment from its initial state; not finite where it blows up."""
-    kept = model.resonant.any(axis=0)
-    E, B = model.exponents[kept], model.B[:, kept]
-    runs = []
-    for s in segments:
-        still = np.zeros((len(s.t) - 1, len(s.z0)), dtype=np.complex128)
-        runs.append(march(s.t, s.z0, model.eigenvalues, E, B, still, still, max_step))
-    return runs
 
 
 def moved(
@@ -223,77 +170,58 @@ def growth(model: RefinedDynamics) -> tuple[float, FloatArray, FloatArray]:
     return penalty(model.demand, model.exponents, model.resonant, (model.eigenvalues, model.B))
 
 
-def _projected(
-    model: RefinedDynamics, z: ComplexArray, segments: tuple[Segment, ...]
-) -> tuple[list[ProjectedRow], FloatArray, float]:
-    """Return the rows of the displacement, the weight of each sample and the weighted sum of squares of the data."""
-    share = np.concatenate([s.share * s.kept for s in segments])
-    motion = np.concatenate([np.full(len(s.t), s.motion) for s in segments])
+def _evaluated(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float) -> _Evaluated:
+    """Simulate and eliminate the displacement; cost inf where a segment blows up or a mode does not decay."""
+    z = np.vstack(simulated(model, segments, max_step))
+    with np.errstate(invalid="ignore", over="ignore"):
+        if not np.abs(z).max() < FAR or np.any(model.eigenvalues.real >= 0):
+            return _Evaluated(model, segments, z, [], 1.0, float("inf"))
+    return _projected(model, segments, z)
+
+
+def _projected(model: RefinedDynamics, segments: tuple[Segment, ...], z: ComplexArray) -> _Evaluated:
+    share = _shares(segments)
+    number = np.concatenate([np.full(len(s.t), s.motion) for s in segments])
     eta = np.vstack([s.eta for s in segments])
     norm = float(np.sum((share[:, None] * eta) ** 2))
     corner = np.prod(np.concatenate([model.amplitude, model.amplitude]) ** model.output.exponents, axis=1)
     # the data of the largest motion are 1 in the units of its share
     corner *= min(s.share for s in segments) * PRIOR_ERROR * np.sqrt(norm) / PRIOR_OUTPUT
-    rows = [project(model.output, z, (eta[:, j], share, motion), corner, j) for j in range(z.shape[1])]
-    return rows, share, norm
-
-
-def _cost(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float) -> float:
-    """Return the cost without derivatives; inf where a segment blows up or a mode does not decay."""
-    z = np.vstack(simulated(model, segments, max_step))
-    with np.errstate(invalid="ignore", over="ignore"):
-        if not np.abs(z).max() < FAR or np.any(model.eigenvalues.real >= 0):
-            return float("inf")
-    rows, _, norm = _projected(model, z, segments)
-    weight, value = _prior(model)
+    rows = project(model.output, z, (eta, share, number), corner)
     misfit = sum(float(row.residual @ row.residual) + row.penalty for row in rows) / norm
-    return misfit + float(weight @ value**2) + growth(model)[0]
+    weight, value = _prior(model)
+    return _Evaluated(model, segments, z, rows, norm, misfit + float(weight @ value**2) + growth(model)[0])
+
+
+def _shares(segments: tuple[Segment, ...]) -> FloatArray:
+    """Return the weight of every sample, 0 where it is held out."""
+    return np.concatenate([s.share * s.kept for s in segments])
+
+
+def _with_output(now: _Evaluated) -> RefinedDynamics:
+    """Return the model with the C and rest positions that were eliminated, and its cost."""
+    C, rest = np.array([row.C for row in now.rows]), np.array([row.rest for row in now.rows]).T
+    return replace(now.model, C=C, rest=rest, cost=now.cost)
 
 
 def linearise(model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float) -> _Linearised:
     """Simulate all segments with sensitivities, eliminate C, and return cost, gradient and Gauss-Newton Hessian."""
-    return _normal_equations(model, segments, _sensitivities(model, segments, max_step))
+    now = _evaluated(model, segments, max_step)
+    return _normal_equations(now, segment_sensitivities(model, segments, max_step))
 
 
-def _normal_equations(
-    model: RefinedDynamics, segments: tuple[Segment, ...], motion: tuple[ComplexArray, ComplexArray]
-) -> _Linearised:
-    """Return cost, gradient and Hessian for z and its sensitivities."""
-    z, S = motion
-    rows, share, norm = _projected(model, z, segments)
-    C, rest = np.array([row.C for row in rows]), np.array([row.rest for row in rows]).T
-    s = slopes(model.output, C, z)
+def _normal_equations(now: _Evaluated, W: list[ComplexArray]) -> _Linearised:
+    """Return cost, gradient and Hessian for the motions and their sensitivities."""
+    model = _with_output(now)
+    s, share = slopes(model.output, model.C, now.z), _shares(now.segments)
     weight, value = _prior(model)
-    cost, slope, curvature = growth(model)
-    shared, n = len(weight), S.shape[2]
+    _, slope, curvature = growth(model)
+    shared, n = len(weight), len(weight) + 2 * len(model.eigenvalues) * len(W)
     hessian, gradient = np.zeros((n, n)), np.zeros(n)
     hessian[:shared, :shared] = np.diag(weight) + curvature
     gradient[:shared] = weight * value + slope
-    cost += float(weight @ value**2)
-    for j, row in enumerate(rows):
-        J = share[:, None] * np.einsum("ti,tic->tc", s[:, j], S).real
-        hessian += row.reduced(J) / norm
-        gradient -= J.T @ row.residual / norm
-        cost += (float(row.residual @ row.residual) + row.penalty) / norm
-    return _Linearised(replace(model, C=C, rest=rest, cost=cost), hessian, gradient)
-
-
-def _sensitivities(
-    model: RefinedDynamics, segments: tuple[Segment, ...], max_step: float
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return z (n_sample, m) and dz (n_sample, m, n_unknown); initial states act on their own segment only."""
-    m, kept = len(model.eigenvalues), model.resonant.any(axis=0)
-    rows, terms = np.nonzero(model.resonant[:, kept])
-    parameters = np.concatenate([np.arange(m), rows]), np.concatenate([np.arange(m), m + terms])
-    linear = np.eye(2 * m, dtype=np.int64)[:m]
-    table = (np.vstack([linear, model.exponents[kept]]), np.hstack([np.zeros((m, m)), model.B[:, kept]]))
-    runs = [sensitivities(s.t, s.z0, model.eigenvalues, table, parameters, max_step) for s in segments]
-    shared = 2 * len(parameters[0])
-    S = np.zeros((sum(len(s.t) for s in segments), m, shared + 2 * m * len(segments)), dtype=np.complex128)
-    first = 0
-    for number, (_, own) in enumerate(runs):
-        block = slice(first, first + len(own))
-        S[block, :, :shared] = own[:, :, :shared]
-        S[block, :, shared + 2 * m * number : shared + 2 * m * (number + 1)] = own[:, :, shared:]
-        first += len(own)
-    return np.vstack([run[0] for run in runs]), S
+    for j, row in enumerate(now.rows):
+        J = output_jacobian(share[:, None] * s[:, j], W)
+        hessian += row.reduced(J) / now.norm
+        gradient -= J.T @ row.residual / now.norm
+    return _Linearised(model, hessian, gradient)

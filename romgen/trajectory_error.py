@@ -36,6 +36,8 @@ class TrajectoryError:
     rest_percent : norm of the mean misfit of the sensors over the last ten periods of the slowest mode, relative to
         the largest norm: what lies between the rest position of the motion and the equilibrium of the model; nan where
         the model diverges.
+    about_rest_percent : NMTE of the sensors with that mean misfit taken off, the error about the motion's own rest
+        position: beside ``sensor_nmte_percent``, not instead of it.
     start : (m,) z of the model at t[0].
     start_fitted : whether the start fits the first window; False where the model diverges within it from every start
         that was tried, and the inverse of the linear chart at the first sample was taken.
@@ -49,6 +51,7 @@ class TrajectoryError:
     first_sample_percent: float
     static_percent: float
     rest_percent: float
+    about_rest_percent: float
     start: ComplexArray = field(metadata={"unit": "1", "axes": "mode"})
     start_fitted: bool
     diverged_s: float
@@ -74,7 +77,7 @@ def trajectory_error(
         rows, snapshots = snapshot_rows(trajectory, r)
         error = nmte_blocks(full, snapshots, coordinates(model, z)[rows])
     static = nmte_percent(r.displacement, evaluate(model.displacement, r.y / model.scale))
-    rest = _rest_percent(r, predicted, model)
+    rest, about_rest = _rest_errors(r, predicted, model)
     return TrajectoryError(
         name=r.name,
         nmte_percent=error,
@@ -82,6 +85,7 @@ def trajectory_error(
         first_sample_percent=cold,
         static_percent=static,
         rest_percent=rest,
+        about_rest_percent=about_rest if finite else float("inf"),
         start=z0,
         start_fitted=fitted,
         diverged_s=float("nan") if finite else float(r.t[int(lost.argmax())]),
@@ -91,11 +95,14 @@ def trajectory_error(
     )
 
 
-def _rest_percent(r: ReducedTrajectory, predicted: FloatArray, model: ReducedModel) -> float:
+def _rest_errors(r: ReducedTrajectory, predicted: FloatArray, model: ReducedModel) -> tuple[float, float]:
+    """Return the norm of the mean late misfit, and the mean norm of what is left without it, in percent."""
     period = 2.0 * np.pi / float(model.eigenvalues.imag.min())
     late = r.t > r.t[-1] - REST_PERIODS * period
-    misfit = (r.displacement - predicted)[late].mean(axis=0)
-    return 100.0 * float(np.linalg.norm(misfit) / np.linalg.norm(r.displacement, axis=1).max())
+    misfit, largest = r.displacement - predicted, float(np.linalg.norm(r.displacement, axis=1).max())
+    rest = misfit[late].mean(axis=0)
+    left = float(np.linalg.norm(misfit - rest, axis=1).mean())
+    return 100.0 * float(np.linalg.norm(rest)) / largest, 100.0 * left / largest
 
 
 def _first_window(model: ReducedModel, r: ReducedTrajectory) -> tuple[ComplexArray, bool]:

@@ -4,38 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
-from romgen.differences import DROPPED, first_derivative, is_uniform
+from romgen.differences import is_uniform
 from romgen.dissipative_fit import dissipative
 from romgen.jackknife import Replicates, blocks_of
-from romgen.metrics import analytic_signal
-from romgen.normal_form import NormalFormFit, Resonance, resonance_table
-from romgen.output_map import output_map
-from romgen.polynomial import monomials, zeta
-from romgen.reduced_dynamics import LinearPart, ReducedDynamics, fit_reduced_dynamics, modal_samples
+from romgen.normal_form import NormalFormFit, Resonance, fit_normal_form, resonance_table, with_replicates
+from romgen.reduced_dynamics import LinearPart
 from romgen.refined_chart import refined_normal_form
-from romgen.refinement import RefinedDynamics, Segment, refine, regrown, replicates
-from romgen.regression import ridge_fit
+from romgen.refined_dynamics import RefinedDynamics, Segment
+from romgen.refinement import refine, regrown, replicates
 from romgen.resonance import ResonanceTable
+from romgen.shooting_start import Start, band_passed, charted, segments, small_eigenvalues, start_model
 
 START_ORDER = 3
-# Lower edge of the first band and upper edge of the last, as shares of the modal frequency.
-BAND = (0.5, 1.5)
-# z'/z counts alike at all amplitudes above this share of the largest: phase drift is what the start must get right.
-AMPLITUDE_FLOOR = 0.06
-EDGE_PERIODS = 1.0
 MIN_PERIODS = 20.0
-SAMPLES_PER_PERIOD = 6.0
 # Segments per motion up to SHOT_ORDER: short enough that the rates of the start lose no period within one. Two blocks
 # of the cross-validation make one, so every segment has samples that count.
 SHOTS, SHOT_ORDER = 4, 5
 SHOT_STEPS, SHOT_DECREASE = 12, 1e-3
+# Cost of the shooting from the direct fit, relative to that from band-passed signals, below which it is taken.
+IMPROVED = 0.9
 STEPS, DECREASE = 30, 1e-4
+# Internal steps: at least so many per period of the fastest mode, and the largest turn of a detuned term within one in
+# radians, which leaves 2e-5 of that term.
+STEPS_PER_PERIOD, LARGEST_TURN = 4.0, 0.5
 
 
 def is_long_enough(training: Sequence[ReducedTrajectory]) -> bool:
@@ -72,8 +68,8 @@ def fit_on_trajectories(
     """
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
     last = next(_grown(training, everything, (order,), (internal_resonance, ridge, known)))
-    table = resonance_table(last.dynamics.eigenvalues, min(order, START_ORDER), internal_resonance)
-    references = _references(training, last.dynamics, table, keep_linear=known is not None)
+    table = resonance_table(last.start.dynamics.eigenvalues, min(order, START_ORDER), internal_resonance)
+    references = _references(training, last.start, table, (ridge, known is not None))
     others = replicates(last.model, last.segments, last.max_step, references)
     spread = Replicates(np.array([o.eigenvalues for o in others]), np.array([o.B for o in others]))
     return replace(last.normal_form(ridge), replicates=spread)
@@ -116,14 +112,14 @@ def growing_fits(
 class _Refined:
     """What refinement has reached at one order."""
 
-    dynamics: ReducedDynamics
+    start: Start
     model: RefinedDynamics
     segments: tuple[Segment, ...]
     table: ResonanceTable
     max_step: float
 
     def normal_form(self, ridge: float) -> NormalFormFit:
-        return refined_normal_form(self.dynamics, self.model, self.table, self.segments, (ridge, self.max_step))
+        return refined_normal_form(self.start.dynamics, self.model, self.table, self.segments, (ridge, self.max_step))
 
 
 def _grown(
@@ -132,27 +128,63 @@ def _grown(
     orders: Sequence[int],
     settings: tuple[Resonance, float, LinearPart | None],
 ) -> Iterator[_Refined]:
-    internal_resonance, ridge, known = settings
+    internal_resonance = settings[0]
     grown = sorted({*growing_orders(orders[0]), *orders})
-    seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
-    dynamics = fit_reduced_dynamics(seen, min(grown[0], START_ORDER), ridge, known)
-    signals = [_signals(dynamics, r) for r in training]
-    table = resonance_table(dynamics.eigenvalues, grown[0], internal_resonance)
-    model = _start(dynamics, training, (signals, kept), table, keep_linear=known is not None)
-    max_step = 2.0 * np.pi / (20.0 * float(dynamics.eigenvalues.imag.max()))
-    shots = _segments(dynamics, training, (signals, kept), SHOTS)
-    whole = _segments(dynamics, training, (signals, kept), 1)
+    start, shooting, shots = _best_start(training, kept, (min(grown[0], START_ORDER), grown[0]), settings)
+    dynamics = start.dynamics
+    whole = segments(start, training, kept, 1)
     first = [next(k for k, s in enumerate(shots) if s.motion == number) for number in range(len(training))]
-    shooting = model
+    model = shooting
     for order in grown:
         table = resonance_table(dynamics.eigenvalues, order, internal_resonance)
+        max_step = largest_resonant_step(dynamics.eigenvalues, table)
         if order <= SHOT_ORDER or order == grown[0]:
-            shooting, shots = refine(regrown(shooting, table), shots, max_step, SHOT_STEPS, SHOT_DECREASE)
+            if order > grown[0]:
+                shooting, shots = refine(regrown(shooting, table), shots, max_step, SHOT_STEPS, SHOT_DECREASE)
             model = shooting
             whole = tuple(replace(s, z0=shots[k].z0) for s, k in zip(whole, first, strict=True))
         model, whole = refine(regrown(model, table), whole, max_step, STEPS, DECREASE)
         if order in orders:
-            yield _Refined(dynamics, *dissipative(model, whole, max_step), table, max_step)
+            yield _Refined(start, *dissipative(model, whole, max_step), table, max_step)
+
+
+def _best_start(
+    training: Sequence[ReducedTrajectory],
+    kept: Sequence[BoolArray],
+    orders: tuple[int, int],
+    settings: tuple[Resonance, float, LinearPart | None],
+) -> tuple[Start, RefinedDynamics, tuple[Segment, ...]]:
+    """Return the start from which multiple shooting comes to the lower cost on the samples that count.
+
+    The direct fit must win by a tenth: band-passed signals know the limit of small motions, which a cost of low order
+    does not value.
+
+    Parameters
+    ----------
+    orders : of the direct fit, which has the linear part of all starts; of the refinement.
+    """
+    internal_resonance, ridge, known = settings
+    seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
+    direct = fit_normal_form(seen, orders[0], internal_resonance, ridge, known)
+    table = resonance_table(direct.dynamics.eigenvalues, orders[1], internal_resonance)
+    max_step = largest_resonant_step(direct.dynamics.eigenvalues, table)
+    found = []
+    for start in (band_passed(direct.dynamics, training), charted(direct, training)):
+        model = start_model(start, training, kept, table, keep_linear=known is not None)
+        shots = segments(start, training, kept, SHOTS)
+        found.append((start, *refine(model, shots, max_step, SHOT_STEPS, SHOT_DECREASE)))
+    band, direct_start = found
+    return direct_start if direct_start[1].cost < IMPROVED * band[1].cost else band
+
+
+def largest_resonant_step(eigenvalues: ComplexArray, table: ResonanceTable) -> float:
+    """Return the internal step in s: a share of the fastest period, and of the slow turn of the terms kept.
+
+    A term with detuning d adds (d h)^4 / 2880 of itself per unit of time to the error (Simpson's rule).
+    """
+    turn = float(np.abs(table.detuning[table.resonant]).max(initial=0.0))
+    shortest = 2.0 * np.pi / float(eigenvalues.imag.max()) / STEPS_PER_PERIOD
+    return min(shortest, LARGEST_TURN / max(turn, np.finfo(float).tiny))
 
 
 def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:
@@ -160,121 +192,16 @@ def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:
     return ReducedTrajectory(r.name, r.t[keep], r.y[keep], r.y_dot[keep], r.displacement[keep], r.velocity[keep])
 
 
-def _signals(dynamics: ReducedDynamics, r: ReducedTrajectory) -> ComplexArray:
-    """Return z ~ the analytic signal of each modal coordinate in its own band."""
-    f = dynamics.eigenvalues.imag / (2.0 * np.pi)
-    edges = np.concatenate([[BAND[0] * f[0]], np.sqrt(f[1:] * f[:-1]), [BAND[1] * f[-1]]])
-    q = modal_samples(dynamics, r)[0].real
-    bands = [(float(edges[j]), float(edges[j + 1])) for j in range(len(f))]
-    return np.column_stack([analytic_signal(r.t, q[:, j], band) for j, band in enumerate(bands)])
-
-
-def _edge(r: ReducedTrajectory, eigenvalues: ComplexArray) -> int:
-    """Return the samples in EDGE_PERIODS of the slowest mode, where a band-pass is distorted."""
-    return int(np.ceil(EDGE_PERIODS * 2.0 * np.pi / float(eigenvalues.imag.min()) / (r.t[1] - r.t[0])))
-
-
-def _start(
-    dynamics: ReducedDynamics,
-    training: Sequence[ReducedTrajectory],
-    signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
-    table: ResonanceTable,
-    *,
-    keep_linear: bool,
-) -> RefinedDynamics:
-    """Return Lambda and B of the band-passed signals, the linear displacement of the modes, and no further terms.
-
-    ``keep_linear`` keeps the eigenvalues of ``dynamics`` here and in the refinement.
-    """
-    m = len(dynamics.eigenvalues)
-    eigenvalues, B = _rates(dynamics, training, signals, table, keep_linear=keep_linear)
-    # w = 2 Re(V q), so eta_j = s_j Re(2 V_jj z_j) and the rest
-    linear = 2.0 * dynamics.scale[:m] * np.diag(dynamics.vectors[:m])
-    output = output_map(linear.astype(np.complex128), table)
-    amplitude = np.max([np.abs(z[keep]).max(axis=0) for z, keep in zip(*signals, strict=True)], axis=0)
-    return RefinedDynamics(
-        eigenvalues=eigenvalues,
-        reference=eigenvalues,
-        keep_linear=keep_linear,
-        amplitude=amplitude,
-        exponents=table.exponents,
-        resonant=table.resonant,
-        B=B,
-        output=output,
-        C=np.zeros(output.terms.shape, dtype=np.complex128),
-        rest=np.zeros((len(training), m)),
-    )
-
-
-def _rates(
-    dynamics: ReducedDynamics,
-    training: Sequence[ReducedTrajectory],
-    signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
-    table: ResonanceTable,
-    *,
-    keep_linear: bool,
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return Lambda and B of z' = Lambda z + B phi(z) by regression with weights 1/(abs(z_j) + floor)."""
-    z, rate = [], []
-    for r, signal, keep in zip(training, *signals, strict=True):
-        edge = _edge(r, dynamics.eigenvalues)
-        inner = keep[DROPPED:-DROPPED].copy()
-        inner[:edge], inner[-edge:] = False, False
-        parts = np.hstack([signal.real, signal.imag])
-        derivative = first_derivative(parts, float(r.t[1] - r.t[0]))
-        m = signal.shape[1]
-        z.append(signal[DROPPED:-DROPPED][inner])
-        rate.append((derivative[:, :m] + 1j * derivative[:, m:])[inner])
-    Z, Z_dot = np.vstack(z), np.vstack(rate)
-    B = np.zeros(table.resonant.shape, dtype=np.complex128)
-    eigenvalues = dynamics.eigenvalues.copy()
-    for j, kept in enumerate(table.resonant):
-        weight = 1.0 / (np.abs(Z[:, j : j + 1]) + AMPLITUDE_FLOOR * np.abs(Z[:, j]).max())
-        own, terms = Z[:, j : j + 1] * weight, monomials(zeta(Z), table.exponents[kept]) * weight
-        rate_j = Z_dot[:, j : j + 1] * weight
-        if keep_linear:
-            B[j, kept] = ridge_fit(terms, rate_j - eigenvalues[j] * own, 0.0)[0]
-        else:
-            row = ridge_fit(np.hstack([own, terms]), rate_j, 0.0)[0]
-            eigenvalues[j], B[j, kept] = row[0], row[1:]
-    return eigenvalues, B
-
-
 def _references(
-    training: Sequence[ReducedTrajectory], dynamics: ReducedDynamics, table: ResonanceTable, *, keep_linear: bool
+    training: Sequence[ReducedTrajectory], start: Start, table: ResonanceTable, settings: tuple[float, bool]
 ) -> ComplexArray:
-    """Return the eigenvalues of the start without each block, (n_block, m): they come from the same data."""
-    signals, block = [_signals(dynamics, r) for r in training], blocks_of(training)
+    """Return what the eigenvalues are tied to without each block, (n_block, m): it comes from the same data."""
+    ridge, keep_linear = settings
+    if start.direct is not None:
+        others = with_replicates(start.direct, training, ridge, keep_linear=keep_linear).replicates
+        assert others is not None
+        return others.eigenvalues
+    block = blocks_of(training)
     ends = np.cumsum([len(r.t) for r in training])[:-1]
     kept = [np.split(block != b, ends) for b in range(block.max() + 1)]
-    rates = (_rates(dynamics, training, (signals, masks), table, keep_linear=keep_linear) for masks in kept)
-    return np.array([eigenvalues for eigenvalues, _ in rates])
-
-
-def _segments(
-    dynamics: ReducedDynamics,
-    training: Sequence[ReducedTrajectory],
-    signals: tuple[Sequence[ComplexArray], Sequence[BoolArray]],
-    n: int,
-) -> tuple[Segment, ...]:
-    """Return n segments of each motion that have samples that count, thinned to a few per period of the fastest mode.
-
-    Initial states are those of the signals, at the start from its first undistorted sample, turned back by the linear
-    part.
-    """
-    period = 2.0 * np.pi / float(dynamics.eigenvalues.imag.max())
-    m = len(dynamics.eigenvalues)
-    segments = []
-    for number, (r, signal, keep) in enumerate(zip(training, *signals, strict=True)):
-        edge = _edge(r, dynamics.eigenvalues)
-        stride = max(1, int(period / (SAMPLES_PER_PERIOD * (r.t[1] - r.t[0]))))
-        share = 1.0 / float(np.linalg.norm(r.y[keep, :m], axis=1).max())
-        bounds = np.arange(n + 1) * len(r.t) // n
-        for k, (first, last) in enumerate(pairwise(bounds)):
-            rows = slice(int(first), int(last), stride)
-            if k > 0 and not keep[rows].any():
-                continue
-            turned = signal[edge] * np.exp(-dynamics.eigenvalues * (r.t[edge] - r.t[0]))
-            z0 = turned if k == 0 else signal[first]
-            segments.append(Segment(r.t[rows], r.y[rows, :m], z0, keep[rows], number, share))
-    return tuple(segments)
+    return np.array([small_eigenvalues(start, training, masks, table, keep_linear=keep_linear) for masks in kept])

@@ -16,7 +16,8 @@ from romgen.dissipative_fit import dissipative, projected
 from romgen.normal_form import resonance_table
 from romgen.output_map import displacement
 from romgen.polynomial import PolynomialMap
-from romgen.refinement import RefinedDynamics, Segment, growth, linearise, moved, refine, regrown, simulated
+from romgen.refined_dynamics import RefinedDynamics, Segment, simulated
+from romgen.refinement import growth, linearise, moved, refine, regrown
 from romgen.stability import tried_stability
 from romgen.trained_range import TrainedRange, trained_range
 from tests.romgen.test_refinement import LAMBDA, MAX_STEP, data, known

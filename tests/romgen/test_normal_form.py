@@ -10,13 +10,14 @@ from romgen.chart import ReducedTrajectory
 from romgen.conjugacy_residual import ConjugacyProblem, linearise, residual, solve_step
 from romgen.differences import first_derivative, resample, second_derivative
 from romgen.errors import NumericalError
+from romgen.etdrk4 import march
 from romgen.manifold import ManifoldFit, lift, nmte_blocks
 from romgen.metrics import analytic_signal, instantaneous, nmte_percent
 from romgen.polynomial import PolynomialMap, evaluate, exponents
 from romgen.reduced_dynamics import decaying_modes, fit_reduced_dynamics
 from romgen.resonance import automatic_resonance, integer_resonance, tolerance_resonance
 from romgen.substitution import substitute_linear
-from romgen.variational import sensitivities
+from romgen.variational import motion, sensitivities
 
 LAMBDA = np.array([-3.2 + 694.1j, -6.5 + 1232.2j])
 
@@ -120,26 +121,42 @@ def test_sensitivities_match_finite_differences() -> None:
     C[:, :2] = 0.0
     t, z0 = np.linspace(0, 0.02, 41), np.array([0.3 + 0.1j, -0.2j])
     rows, terms = np.array([0, 1, 0, 1]), np.array([0, 1, 7, 12])
-    S = sensitivities(t, z0, LAMBDA, (E, C), (rows, terms), 1e-4)[1]
-    none = np.zeros(0, dtype=np.int64)
+    z, W = sensitivities(t, z0, LAMBDA, (E, C), (rows, terms), 1e-4)
+    assert np.array_equal(z, motion(t, z0, LAMBDA, (E, C), 1e-4))
 
-    def run(C: np.ndarray, z0: np.ndarray) -> np.ndarray:
-        return sensitivities(t, z0, LAMBDA, (E, C), (none, none), 1e-4)[0]
+    def change(column: int, unit: complex) -> np.ndarray:
+        """dz = W d theta, and what the conjugate of d theta adds through d conj z."""
+        dz: np.ndarray = W[:, :2, column] * unit + (W[:, 2:, column] * unit).conj()
+        return dz
 
     for p in range(4):
-        for part, unit in enumerate((1.0, 1j)):
+        for unit in (1.0, 1j):
             step = np.zeros_like(C)
             step[rows[p], terms[p]] = 1e-4 * unit
-            slope = (run(C + step, z0) - run(C - step, z0)) / 2e-4
-            assert S[:, :, 2 * p + part] == pytest.approx(slope, rel=1e-6, abs=1e-10)
-    for column, unit in (
-        (8, np.array([1, 0])),
-        (9, np.array([0, 1])),
-        (10, np.array([1j, 0])),
-        (11, np.array([0, 1j])),
-    ):
-        slope = (run(C, z0 + 1e-5 * unit) - run(C, z0 - 1e-5 * unit)) / 2e-5
-        assert S[:, :, column] == pytest.approx(slope, rel=1e-6, abs=1e-8)
+            ends = [motion(t, z0, LAMBDA, (E, C + sign * step), 1e-4) for sign in (1.0, -1.0)]
+            assert change(p, unit) == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-6, abs=1e-10)
+    for j in range(2):
+        for unit in (1.0, 1j):
+            step = 1e-5 * unit * np.eye(2)[j]
+            ends = [motion(t, z0 + sign * step, LAMBDA, (E, C), 1e-4) for sign in (1.0, -1.0)]
+            assert change(4 + j, unit) == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-6, abs=1e-8)
+
+
+def test_steps_of_fourth_order_through_resonant_terms_as_long_as_the_samples() -> None:
+    """Against ETDRK4 in 2^7 finer steps; with terms that turn with their mode one step per sample is nearly exact."""
+    E = exponents(4, 2, 3)
+    turning = np.array([j == (E @ [1, 2, -1, -2]) for j in (1, 2)])
+    rng = np.random.default_rng(4)
+    C = 20.0 * (rng.normal(size=turning.shape) + 1j * rng.normal(size=turning.shape)) * turning
+    eigenvalues = np.array([-2.0 + 60.0j, -3.0 + 121.0j])
+    t, z0 = np.linspace(0.0, 0.4, 33), np.array([0.3 + 0.1j, -0.2j])
+    still = np.zeros((32, 2), dtype=complex)
+    exact = march(t, z0, eigenvalues, E, C, still, still, 0.0125 / 2**8)
+    errors = [np.abs(motion(t, z0, eigenvalues, (E, C), 0.0125 / n) - exact).max() for n in (1, 2, 4)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.4)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(4.0, abs=0.2)
+    # a turn of 1.5 rad of the fast mode per step; rates of the nonlinear terms up to 20/s: (20 * 0.0125)^4 / 120
+    assert errors[0] < 1e-4
 
 
 def test_growing_modes_are_refused() -> None:

@@ -85,6 +85,8 @@ def test_a_motion_that_comes_to_rest_elsewhere_is_noted() -> None:
     error = trajectory_error(model, moved, motion, None)
     # relative to 0.51; the decay left at the end, exp(-1.8) of the start, averages out over ten periods to about 1 %
     assert abs(error.rest_percent - 100 * 0.01 / 0.51) < 0.2
+    # without the offset of 2 % of the largest motion what is left is the error of the model, far below it
+    assert error.about_rest_percent < 0.2 * error.sensor_nmte_percent
     assert "'slipped' comes to rest" in learning_notes([motion], None, model, [error])[0]
 
 

@@ -15,18 +15,8 @@ from romgen.normal_form import resonance_table
 from romgen.output_map import displacement, output_map, slopes
 from romgen.polynomial import monomials, zeta
 from romgen.refined_chart import chart_terms, velocity_rows
-from romgen.refinement import (
-    RefinedDynamics,
-    Segment,
-    _cost,
-    _prior,
-    growth,
-    linearise,
-    moved,
-    refine,
-    regrown,
-    simulated,
-)
+from romgen.refined_dynamics import RefinedDynamics, Segment, simulated
+from romgen.refinement import _evaluated, _prior, growth, linearise, moved, refine, regrown
 from romgen.trained_range import box_range
 
 LAMBDA = np.array([-2.0 + 60.0j, -3.0 + 121.0j])
@@ -74,12 +64,12 @@ def test_gradient_matches_finite_differences(shots: int) -> None:
     truth = known()
     model, segments = disturbed(truth, data(truth, shots=shots))
     here = linearise(model, segments, MAX_STEP)
-    assert here.model.cost == pytest.approx(_cost(model, segments, MAX_STEP), rel=1e-9)
+    assert here.model.cost == pytest.approx(_evaluated(model, segments, MAX_STEP).cost, rel=1e-9)
     scale = np.sqrt(np.diag(here.hessian))
     for k in range(len(here.gradient)):
         step = np.zeros_like(here.gradient)
         step[k] = 1e-4 / scale[k]
-        ahead, behind = (_cost(*moved(here.model, segments, sign * step), MAX_STEP) for sign in (1.0, -1.0))
+        ahead, behind = (_evaluated(*moved(here.model, segments, sign * step), MAX_STEP).cost for sign in (1.0, -1.0))
         # the output map and the rests are eliminated, which leaves the gradient exact; central difference
         slope = (ahead - behind) / (2.0 * step[k])
         assert 2.0 * here.gradient[k] == pytest.approx(slope, rel=1e-4, abs=1e-4 * scale[k] * here.model.cost**0.5)
@@ -93,7 +83,7 @@ def test_gradient_with_missing_dissipation_matches_finite_differences() -> None:
     missing, half_gradient, _ = growth(model)
     assert missing > 0.0
     here = linearise(model, segments, MAX_STEP)
-    assert here.model.cost == pytest.approx(_cost(model, segments, MAX_STEP), rel=1e-9)
+    assert here.model.cost == pytest.approx(_evaluated(model, segments, MAX_STEP).cost, rel=1e-9)
     shared = len(half_gradient)
     for k in range(shared):
         step = np.zeros_like(here.gradient)

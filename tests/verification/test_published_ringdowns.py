@@ -29,6 +29,8 @@ def test_mixed_ringdown_is_predicted_from_the_other_two() -> None:
     learned = mixed_left_out(path)
     assert learned.orders.method == "trajectories"
     assert learned.validation[0].sensor_nmte_percent < 5.0
+    # the limit of small motions is that of the data, so the first sample alone is a start too
+    assert learned.validation[0].first_sample_percent < 5.0
     bending, torsion = learned.training
     assert bending.sensor_nmte_percent < 1.0
     # residual slip: mean of the last fifth of the samples of the data alone, without any model
@@ -36,3 +38,24 @@ def test_mixed_ringdown_is_predicted_from_the_other_two() -> None:
     slip = 100 * np.linalg.norm(tail) / np.linalg.norm(torsion.displacement, axis=1).max()
     assert torsion.rest_percent == pytest.approx(slip, abs=0.2)
     assert any("comes to rest" in note for note in learned.notes)
+    # beside the error itself: the slip is taken off
+    assert torsion.about_rest_percent < torsion.sensor_nmte_percent
+
+
+@pytest.mark.slow
+def test_all_three_ringdowns_meet_their_targets_as_far_as_one_equilibrium_can() -> None:
+    """Bending and mixed below 1 %; the torsion decay rests 2 % of its largest motion off, so its target is missed."""
+    path = DATA / "trc_comsol_training.mat"
+    if not path.is_file():
+        pytest.skip(f"{path} is absent")
+    learned = learn(read_trajectories([path], SENSORS, "m"), [], LearnSettings(), "benchmark")
+    bending, _, mixed = learned.training
+    assert learned.orders.method == "trajectories"
+    assert max(bending.sensor_nmte_percent, mixed.sensor_nmte_percent) < 1.0
+    # published for the order-7 model on unseen data: 9.16 %
+    assert max(error.first_sample_percent for error in learned.training) < 9.16
+    assert learned.model.stability is not None
+    assert learned.model.stability.is_stable
+    # tails of the decays by a straight line through log amplitude and phase: 3.3 to 3.4 1/s, 110.8 to 111.2 Hz
+    assert learned.model.eigenvalues[0].real == pytest.approx(-3.35, rel=0.05)
+    assert learned.model.eigenvalues[0].imag / (2.0 * np.pi) == pytest.approx(111.0, rel=0.005)

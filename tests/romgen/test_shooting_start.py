@@ -1,0 +1,76 @@
+"""Starts of the refinement: fast exchange needs the direct fit, small motions give Lambda."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from romgen import trajectory_fit
+from romgen.arrays import ComplexArray, FloatArray
+from romgen.chart import ReducedTrajectory
+from romgen.differences import first_derivative
+from romgen.etdrk4 import march
+from romgen.normal_form import fit_normal_form, resonance_table
+from romgen.order_selection import motion_error
+from romgen.shooting_start import band_passed, rates, small_eigenvalues
+from romgen.trajectory_fit import fit_on_trajectories
+
+LAMBDA = np.array([-0.5 + 60.0j, -0.8 + 121.0j])
+STEP = 0.002
+
+
+def motion(z: ComplexArray, rest: FloatArray) -> ReducedTrajectory:
+    """Return the motion eta = Re z + rest with its derivatives by differences."""
+    eta = z.real + rest
+    rate = first_derivative(eta, STEP)
+    cut = (len(eta) - len(rate)) // 2
+    twice = first_derivative(rate, STEP)
+    y = np.hstack([eta[2 * cut : -2 * cut], rate[cut:-cut]])
+    y_dot = np.hstack([rate[cut:-cut], twice])
+    return ReducedTrajectory("motion", STEP * np.arange(len(y)), y, y_dot, y[:, :2], y[:, 2:])
+
+
+def exchanging() -> list[ReducedTrajectory]:
+    """1:2 resonance in which nearly all energy changes the mode within three periods; orders 2 and 3."""
+    table = resonance_table(LAMBDA, 3, (1, 2))
+    E, B = table.exponents, np.zeros(table.resonant.shape, dtype=np.complex128)
+    # conj(z_1) z_2 and z_1^2 keep abs(z_1)^2 + 2 abs(z_2)^2
+    B[0, (E == [0, 1, 1, 0]).all(axis=1)], B[1, (E == [2, 0, 0, 0]).all(axis=1)] = 40.0j, 20.0j
+    B[0, (E == [2, 0, 1, 0]).all(axis=1)], B[1, (E == [0, 2, 0, 1]).all(axis=1)] = -10.0j, 5.0j
+    t = STEP * np.arange(1601)
+    still = np.zeros((1600, 2), dtype=np.complex128)
+    starts = (np.array([0.45, 0.05j]), np.array([0.1, 0.35 + 0.1j]), np.array([0.3j, -0.2]))
+    return [motion(march(t, z0.astype(complex), LAMBDA, E, B, still, still, 2e-4), np.zeros(2)) for z0 in starts]
+
+
+def test_fast_exchange_is_refined_from_the_direct_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Better than the direct fit on what both were fitted to, and than what band-passed signals alone lead to."""
+    motions = exchanging()
+    direct = fit_normal_form(motions, 3, (1, 2), 1e-8)
+    refined = fit_on_trajectories(motions, 3, (1, 2), 1e-8)
+    monkeypatch.setattr(trajectory_fit, "charted", lambda fit, training: band_passed(fit.dynamics, training))
+    banded = fit_on_trajectories(motions, 3, (1, 2), 1e-8)
+    errors = [np.mean([motion_error(fit, r) for r in motions]) for fit in (direct, refined, banded)]
+    assert errors[1] < min(errors[0], errors[2])
+
+
+def test_small_motions_give_the_linear_part_that_a_polynomial_over_all_amplitudes_bends() -> None:
+    """Frequency 60 - 8 sqrt(abs(z_1)) rad/s, which no polynomial follows, and a motion that comes to rest elsewhere.
+
+    Below 15 % of the amplitude 0.4 the frequency is between 60 and 60 - 8 sqrt(0.06); what the regression misses of 60
+    goes with the root of the largest amplitude that it sees, sqrt(0.15) of what that over all samples does.
+    """
+    t = STEP * np.arange(3001)
+    amplitude = 0.4 * np.exp(-0.9 * t)
+    # integral of 8 sqrt(0.4) exp(-0.45 t)
+    phase = 60.0 * t - 8.0 * np.sqrt(0.4) * (1.0 - np.exp(-0.45 * t)) / 0.45
+    second = 0.3 * np.exp((-1.5 + 121.0j) * t)
+    r = motion(np.column_stack([amplitude * np.exp(1j * phase), second]), np.array([0.01, -0.01]))
+    kept = [np.ones(len(r.t), dtype=bool)]
+    start = band_passed(fit_normal_form([r], 3, (1, 2), 1e-8).dynamics, [r])
+    table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
+    small = small_eigenvalues(start, [r], kept, table, keep_linear=False)
+    everything = rates(start, [r], kept, table, keep_linear=False)[0]
+    assert 60.0 - 8.0 * np.sqrt(0.06) < small[0].imag < 60.0
+    assert abs(small[0].imag - 60.0) < 1.5 * np.sqrt(0.15) * abs(everything[0].imag - 60.0)
+    assert small[0].real == pytest.approx(-0.9, rel=0.05)
