@@ -38,8 +38,11 @@ static void sample(rom_instance *s, double tau, double u[])
     if (s->request_inputs == NULL)
         input_at(&s->memory, tau, u);
     else {
-        if (tau > 0.0)
+        if (tau > 0.0) {
+            s->memory.mode = MODE_WITHIN_STEP;
             s->request_inputs(s->importer, s->memory.time + tau);
+            s->memory.mode = MODE_STEP_COMPLETE;
+        }
         input_at(&s->memory, 0.0, u);
     }
 }

@@ -67,7 +67,8 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
 {
     rom_instance *s = c;
-    if (!rom_permits(s, MODE_WRITABLE, "fmi2SetReal") || !references_exist(s, vr, n, VR_REAL_END, "fmi2SetReal"))
+    if (!rom_permits(s, MODE_WRITABLE | MODE_WITHIN_STEP, "fmi2SetReal") ||
+        !references_exist(s, vr, n, VR_REAL_END, "fmi2SetReal"))
         return fmi2Error;
     for (size_t k = 0; k < n; ++k)
         if (value == NULL || !rom_settable_real(s, vr[k], value[k]))

@@ -184,6 +184,8 @@ int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value
         return before_start && !START_FROM_SENSORS;
     if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return 1;
+    if (mode == MODE_WITHIN_STEP)
+        return 0;
     if (rom_in_block(vr, VR_START, N_START))
         return before_start;
     switch (vr) {
