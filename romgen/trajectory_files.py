@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,9 @@ import scipy.io
 
 from romgen.arrays import FloatArray
 from romgen.errors import InputError
-from romgen.settings.quantities import UNITS
+from romgen.settings.quantities import unit_factor
 from romgen.trajectory import Trajectory
+from romgen.trajectory_csv import read_csv
 
 Pair = tuple[str, FloatArray, FloatArray]
 
@@ -25,7 +25,7 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
     Parameters
     ----------
     files : .mat (cell array with columns t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and .npz (as
-        written by ``write_trajectories``, or NPZ arrays t and x), .csv (header "t [s], name [mm], ...").
+        written by ``write_trajectories``, or NPZ arrays t and x), .csv (``romgen.trajectory_csv``).
     sensors : names of the rows of x; CSV columns are found by these names.
     unit : unit of displacement where the file has none, e.g. "m" or "mm".
 
@@ -50,6 +50,8 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
             raise
         except Exception as error:  # h5py, numpy, scipy and zipfile each raise their own for a damaged file
             raise InputError(f"truncated, damaged or of another format ({error})", where=str(path)) from error
+        if not pairs:
+            raise InputError("holds no trajectory", where=str(path), advice="it needs arrays t and x")
         for name, t, x in pairs:
             where = f"{path.name}, trajectory '{name}'"
             _check(t, x, sensors, where)
@@ -77,12 +79,15 @@ def write_trajectories(path: Path, trajectories: Iterable[Trajectory]) -> None:
 
 
 def _factor(unit: str, where: str) -> float:
-    if unit not in UNITS["m"]:
-        raise InputError("unknown unit", where=where, value=unit, advice=f"use one of {', '.join(UNITS['m'])}")
-    return UNITS["m"][unit]
+    try:
+        return unit_factor(unit, "m")
+    except ValueError as error:
+        raise InputError(str(error), where=where) from error
 
 
-def _time_first(x: FloatArray, n_time: int) -> FloatArray:
+def _time_first(x: Any, n_time: int) -> FloatArray:
+    if np.iscomplexobj(x):
+        raise ValueError("x is complex, displacements are real")
     x = np.atleast_2d(np.asarray(x, dtype=np.float64))
     return np.ascontiguousarray(x if x.shape[0] == n_time else x.T)
 
@@ -118,19 +123,33 @@ def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
 
 def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
     with h5py.File(path) as file:
+        if isinstance(file.get("t"), h5py.Dataset) and isinstance(file.get("x"), h5py.Dataset):
+            return [_group_pair(path.stem, file, sensors, unit)]
         pairs = []
         for name, group in file.items():
             if not isinstance(group, h5py.Group) or "t" not in group or "x" not in group:
                 raise InputError("group without t and x", where=f"{path.name}/{name}")
-            stored = group["x"].attrs.get("unit", unit)
-            x = _factor(str(stored), path.name) * np.asarray(group["x"], dtype=np.float64)
-            pairs.append((str(name), np.asarray(group["t"], dtype=np.float64), x))
+            pairs.append(_group_pair(str(name), group, sensors, unit))
     return pairs
+
+
+def _group_pair(name: str, group: h5py.Group, sensors: Sequence[str], unit: str) -> Pair:
+    """Return t and x of a group; where it names its sensors and the study names one of them, they are found by name."""
+    t = np.asarray(group["t"], dtype=np.float64).ravel()
+    where = f"{Path(group.file.filename).name}, trajectory '{name}'"
+    x = _factor(str(group["x"].attrs.get("unit", unit)), where) * _time_first(group["x"][()], t.size)
+    own = [str(sensor) for sensor in group.attrs.get("sensors", ())]
+    if not set(own) & set(sensors):
+        return name, t, x
+    missing = [sensor for sensor in sensors if sensor not in own]
+    if missing:
+        raise InputError("no such sensor", where=where, value=missing[0], advice=f"the file has {', '.join(own)}")
+    return name, t, x[:, [own.index(sensor) for sensor in sensors]]
 
 
 def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
     with path.open("rb") as file, np.load(file) as arrays:
-        names = sorted({key.rpartition("/")[0] for key in arrays.files if key.endswith("t")})
+        names = sorted({key.rpartition("/")[0] for key in arrays.files if key.rpartition("/")[2] == "t"})
         pairs = []
         for name in names:
             prefix = f"{name}/" if name else ""
@@ -141,39 +160,6 @@ def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
             factor = 1.0 if name else _factor(unit, path.name)
             pairs.append((name or path.stem, t, factor * _time_first(arrays[f"{prefix}x"], t.size)))
     return pairs
-
-
-def _read_csv(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.reader(file) if row]
-    if len(rows) < 2:
-        raise InputError("no data rows", where=str(path))
-    heads = [_head(cell) for cell in rows[0]]
-    names = [name for name, _ in heads]
-    columns = []
-    for wanted, kind, default in [("t", "s", "s"), *((sensor, "m", unit) for sensor in sensors)]:
-        if wanted not in names:
-            raise InputError(
-                f"no column '{wanted}'", where=path.name, value=names, advice="header: t [s], name [mm], ..."
-            )
-        symbol = heads[names.index(wanted)][1] or default
-        if symbol not in UNITS[kind]:
-            raise InputError("unknown unit", where=f"{path.name}, column '{wanted}'", value=symbol)
-        columns.append((names.index(wanted), UNITS[kind][symbol]))
-    table = np.array([[_number(row, k, line, path) * f for k, f in columns] for line, row in enumerate(rows[1:], 2)])
-    return [(path.stem, table[:, 0].copy(), np.ascontiguousarray(table[:, 1:]))]
-
-
-def _head(cell: str) -> tuple[str, str]:
-    name, _, rest = cell.partition("[")
-    return name.strip(), rest.rstrip("] \t").strip()
-
-
-def _number(row: list[str], column: int, line: int, path: Path) -> float:
-    try:
-        return float(row[column])
-    except (IndexError, ValueError) as error:
-        raise InputError("not a number", where=f"{path.name}, line {line}, column {column + 1}", value=row) from error
 
 
 def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> None:
@@ -213,5 +199,5 @@ _READERS: dict[str, Callable[[Path, Sequence[str], str], list[Pair]]] = {
     ".h5": _read_hdf5,
     ".hdf5": _read_hdf5,
     ".npz": _read_npz,
-    ".csv": _read_csv,
+    ".csv": read_csv,
 }
