@@ -52,6 +52,9 @@ def with_table(model: ReducedModel, table: bytes) -> ReducedModel:
     n_form = 2 * max(1, int(np.count_nonzero(model.normal_form.coefficients)))
     chart, sensors = monomial_programme(model.chart.exponents), sensor_programme(model)
     n_chart, n_reduced = chart.n_monomial * chart.n_var, chart.n_var
+    n_sensor = sensors.n_monomial * 2 * len(model.sensors)
+    if len(words) != n_form + 2 * n_chart + n_sensor:
+        raise ValueError(f"{TABLE_FILE} has {len(words)} numbers, the model {n_form + 2 * n_chart + n_sensor}")
     re, im, rows = np.split(words[n_form:], [n_chart, 2 * n_chart])
     dense_chart = (re + 1j * im).reshape(chart.n_monomial, n_reduced).T
     dense = rows.reshape(sensors.n_monomial, 2 * len(model.sensors)).T
