@@ -170,6 +170,8 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
             value=x.shape,
             advice=f"expected {(t.size, len(sensors))}",
         )
+    if t.size < 2:
+        raise InputError("too few samples for a motion", where=where, value=t.size)
     bad = ~np.isfinite(np.column_stack([t, x]))
     if bad.any():
         row, column = map(int, np.argwhere(bad)[0])
@@ -182,7 +184,7 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
     constant = np.flatnonzero(np.ptp(x, axis=0) == 0)
     if constant.size:
         raise InputError(
-            "the sensor is constant", where=f"{where}, sensor '{sensors[constant[0]]}'", value=x[0, constant[0]]
+            "the sensor is constant", where=f"{where}, sensor '{sensors[constant[0]]}'", value=float(x[0, constant[0]])
         )
 
 

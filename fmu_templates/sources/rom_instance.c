@@ -45,33 +45,45 @@ int rom_permits(const rom_instance *s, int modes, const char *function)
 
 void rom_invalidate(rom_instance *s)
 {
-    s->rate_is_valid = 0;
-    s->output_is_valid = 0;
+    s->known = 0;
 }
 
 void rom_update_rate(rom_instance *s)
 {
-    if (s->rate_is_valid)
+    if ((s->known & KNOWN_RATE) != 0)
         return;
     double u[N_INPUT_STORED];
     for (size_t i = 0; i < N_INPUT_STORED; ++i)
         u[i] = s->memory.input_gain * s->memory.input[i];
     rom_rate(s->memory.z, u, &s->workspace, s->rate);
-    s->rate_is_valid = 1;
+    s->known |= KNOWN_RATE;
 }
 
-static const rom_output *updated_output(rom_instance *s)
+/* Sensor row k, computed with the others of its kind */
+static double sensor(rom_instance *s, size_t k)
 {
-    if (!s->output_is_valid)
-        rom_outputs(s->memory.z, &s->workspace, &s->output);
-    s->output_is_valid = 1;
+    const size_t first = k < N_SENSOR ? 0 : N_SENSOR;
+    const unsigned kind = k < N_SENSOR ? KNOWN_DISPLACEMENT : KNOWN_VELOCITY;
+    if ((s->known & KNOWN_CHART) == 0)
+        rom_chart(s->memory.z, &s->workspace);
+    if ((s->known & kind) == 0)
+        rom_sensors(&s->workspace, first, s->output.sensor + first);
+    s->known |= KNOWN_CHART | kind;
+    return s->output.sensor[k];
+}
+
+static const rom_output *amplitudes(rom_instance *s)
+{
+    if ((s->known & KNOWN_AMPLITUDE) == 0)
+        rom_amplitudes(s->memory.z, &s->output);
+    s->known |= KNOWN_AMPLITUDE;
     return &s->output;
 }
 
-fmi2Status rom_check_trust(rom_instance *s)
+fmi2Status rom_check_trust(rom_instance *s, double ratio)
 {
     const int was_inside = s->memory.inside != 0.0;
-    const int is_inside = rom_trust_ratio(s->memory.z) <= s->memory.trust_radius;
+    const int is_inside = ratio <= s->memory.trust_radius;
     s->memory.inside = is_inside ? 1.0 : 0.0;
     if (was_inside && !is_inside) {
         const int warn = s->memory.warn_on_crossing != 0.0;
@@ -87,9 +99,9 @@ fmi2Status rom_check_trust(rom_instance *s)
     return fmi2OK;
 }
 
-int rom_beyond_hard_limit(const rom_instance *s, const rom_complex z[])
+int rom_beyond_hard_limit(const rom_instance *s, double ratio)
 {
-    return !(rom_trust_ratio(z) <= s->memory.hard_limit);
+    return !(ratio <= s->memory.hard_limit);
 }
 
 static double constant(fmi2ValueReference vr)
@@ -146,20 +158,20 @@ double rom_get_real(rom_instance *s, fmi2ValueReference vr)
     if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return s->memory.input[vr - VR_INPUT];
     if (vr < VR_ABSOLUTE)
-        return updated_output(s)->sensor[vr - VR_SENSOR];
+        return sensor(s, vr - VR_SENSOR);
     if (vr < VR_AMPLITUDE)
-        return updated_output(s)->sensor[vr - VR_ABSOLUTE] + base_motion(&s->memory, vr - VR_ABSOLUTE);
+        return sensor(s, vr - VR_ABSOLUTE) + base_motion(&s->memory, vr - VR_ABSOLUTE);
     if (vr < VR_PHASE)
-        return updated_output(s)->amplitude[vr - VR_AMPLITUDE];
+        return amplitudes(s)->amplitude[vr - VR_AMPLITUDE];
     if (vr < VR_TRUST_RATIO)
-        return updated_output(s)->phase[vr - VR_PHASE];
+        return amplitudes(s)->phase[vr - VR_PHASE];
     if (rom_in_block(vr, VR_START, N_START))
         return s->memory.start[vr - VR_START];
     if (rom_in_block(vr, VR_START_MISFIT, START_FROM_SENSORS))
         return s->memory.start_misfit;
     switch (vr) {
     case VR_TRUST_RATIO:
-        return updated_output(s)->trust_ratio;
+        return amplitudes(s)->trust_ratio;
     case VR_INPUT_GAIN:
         return s->memory.input_gain;
     case VR_TRUST_RADIUS:
@@ -203,9 +215,7 @@ int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value
 
 void rom_set_real(rom_instance *s, fmi2ValueReference vr, double value)
 {
-    s->rate_is_valid = 0;
-    if (vr < VR_RATE)
-        s->output_is_valid = 0; /* what is kept of the outputs depends on no input */
+    s->known &= vr < VR_RATE ? 0U : ~(unsigned)KNOWN_RATE; /* what is kept of the outputs depends on no input */
     if (vr < VR_RATE && vr % 2 == 0)
         s->memory.z[vr / 2].re = value;
     else if (vr < VR_RATE)

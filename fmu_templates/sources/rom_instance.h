@@ -68,6 +68,15 @@ typedef struct rom_snapshot {
     struct rom_snapshot *next;
 } rom_snapshot;
 
+/* What has been computed for the present memory; each is computed when it is first asked for. */
+enum {
+    KNOWN_RATE = 1 << 0,
+    KNOWN_CHART = 1 << 1,
+    KNOWN_DISPLACEMENT = 1 << 2,
+    KNOWN_VELOCITY = 1 << 3,
+    KNOWN_AMPLITUDE = 1 << 4
+};
+
 /* Lets the importer set the inputs at a time within a step. */
 typedef void (*rom_input_request)(void *importer, double time);
 
@@ -77,7 +86,7 @@ typedef struct {
     rom_workspace workspace;
     rom_complex rate[N_MODE];
     rom_output output;
-    int rate_is_valid, output_is_valid;
+    unsigned known;
     rom_snapshot *snapshots; /* every live handle given out by fmi2GetFMUstate */
     rom_logger logger;
     unsigned initial_categories;
@@ -101,10 +110,10 @@ void rom_invalidate(rom_instance *s);
 
 void rom_update_rate(rom_instance *s);
 
-/* Logs a crossing of the trust radius; fmi2Warning on leaving it, if wanted. */
-fmi2Status rom_check_trust(rom_instance *s);
+/* Logs a crossing of the trust radius by the present ratio; fmi2Warning on leaving it, if wanted. */
+fmi2Status rom_check_trust(rom_instance *s, double ratio);
 
-int rom_beyond_hard_limit(const rom_instance *s, const rom_complex z[]);
+int rom_beyond_hard_limit(const rom_instance *s, double ratio);
 
 /* With START_FROM_SENSORS, puts the state where the sensors best show the start values; does nothing otherwise. */
 void rom_update_start(rom_instance *s);

@@ -14,7 +14,7 @@ import numpy as np
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.fmu.programme import fold_conjugates
-from romgen.fmu.tables import TABLE_FILE, table_bytes, with_table
+from romgen.fmu.tables import TABLE_FILE, TABLE_LAYOUT, table_bytes, with_table
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 from romgen.stability import Stability
@@ -86,7 +86,7 @@ def _text(content: dict[str, object]) -> str:
 
 def _map(p: PolynomialMap[np.float64] | PolynomialMap[np.complex128], table: str | None = None) -> dict[str, object]:
     if table is not None:
-        return {"exponents": p.exponents.tolist(), "coefficients": table}
+        return {"exponents": p.exponents.tolist(), "coefficients": table, "layout": TABLE_LAYOUT}
     is_complex = np.iscomplexobj(p.coefficients)
     return {
         "exponents": p.exponents.tolist(),
@@ -115,6 +115,8 @@ def model_from_json(text: str, table: bytes | None = None, where: str = "rom.jso
         content = json.loads(text)
         if content["format"] != FORMAT:
             raise ValueError(f"format is '{content['format']}'")
+        if table is not None and content["chart"].get("layout") != TABLE_LAYOUT:
+            raise ValueError(f"{TABLE_FILE} was written by another version of romgen; export the unit again")
         if table is None and content["chart"]["coefficients"] == TABLE_FILE:
             raise ValueError(f"{TABLE_FILE} with its coefficients is missing")
         if table is None:

@@ -128,6 +128,12 @@ def test_bad_data_are_named(tmp_path: Path, change: str, message: str) -> None:
         read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
 
 
+def test_one_sample_is_no_motion(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", t=T[:1], x=X[:1])
+    with pytest.raises(InputError, match="too few samples for a motion; got 1"):
+        read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
+
+
 def test_csv_cell_that_is_no_number(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t [s],lower [m],upper [m]\n0,1,2\n1,x,2\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"a\.csv, line 3, column 2: not a number"):
