@@ -50,7 +50,10 @@ def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) 
         if not is_uniform(trajectory.t, chart.step):
             yield f"trajectory '{trajectory.name}' was resampled to a step of {chart.step:.6g} s"
     if chart.delays > 1:
-        yield f"too few sensors for {len(chart.frequency_hz)} modes: {chart.delays} delays were used"
+        n_mode = len(chart.frequency_hz)
+        few = chart.projection.shape[1] // chart.delays < n_mode
+        why = f"too few sensors for {n_mode} modes" if few else f"sensors too similar or too noisy for {n_mode} modes"
+        yield f"{why}: {chart.delays} delays were used"
 
 
 def choice_sentence(orders: OrderTable) -> str:
