@@ -32,7 +32,7 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
     Raises
     ------
     InputError : names file, trajectory, row and value: unknown unit, not readable, wrong number of sensors, NaN,
-        time that does not increase, a constant sensor.
+        time that does not increase, a constant sensor, motions about another position than 0.
     """
     _factor(unit, "[data] unit")
     trajectories: list[Trajectory] = []
@@ -185,6 +185,14 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
     if constant.size:
         raise InputError(
             "the sensor is constant", where=f"{where}, sensor '{sensors[constant[0]]}'", value=float(x[0, constant[0]])
+        )
+    # One sensor may move to one side only, as the axial one of a beam does; all of them do not.
+    if np.all((x.min(axis=0) > 0.0) | (x.max(axis=0) < 0.0)):
+        raise InputError(
+            "no sensor ever crosses 0, but displacements count from the position of rest",
+            where=where,
+            value=f"mean {np.mean(x[:, 0]):.4g} m of '{sensors[0]}'",
+            advice="subtract what each sensor shows at rest",
         )
 
 

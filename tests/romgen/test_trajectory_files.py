@@ -134,6 +134,15 @@ def test_one_sample_is_no_motion(tmp_path: Path) -> None:
         read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
 
 
+def test_sensors_with_an_offset_are_named(tmp_path: Path) -> None:
+    """All sensors on one side of 0 show no motion about rest; one of them may."""
+    np.savez(tmp_path / "run.npz", t=T, x=X + np.array([2.0, -3.0]))
+    with pytest.raises(InputError, match=r"no sensor ever crosses 0.*of 'lower'; subtract what each sensor shows"):
+        read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
+    np.savez(tmp_path / "run.npz", t=T, x=X + np.array([2.0, -0.5]))
+    assert len(read_trajectories([tmp_path / "run.npz"], SENSORS, "m")) == 1
+
+
 def test_csv_cell_that_is_no_number(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t [s],lower [m],upper [m]\n0,1,2\n1,x,2\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"a\.csv, line 3, column 2: not a number"):
