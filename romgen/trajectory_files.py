@@ -24,8 +24,8 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
 
     Parameters
     ----------
-    files : .mat (cell array with columns t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and .npz (as
-        written by ``write_trajectories``, or NPZ arrays t and x), .csv (``romgen.trajectory_csv``).
+    files : .mat (cell array with columns t and x, or t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and
+        .npz (as written by ``write_trajectories``, or t and x alone), .csv (``romgen.trajectory_csv``).
     sensors : names of the rows of x; CSV columns are found by these names.
     unit : unit of displacement where the file has none, e.g. "m" or "mm".
 
@@ -109,7 +109,10 @@ def _mat_v5(path: Path) -> list[tuple[FloatArray, FloatArray]]:
     for value in contents.values():
         if isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 2 and value.shape[1] >= 2:
             return [(row[0], row[1]) for row in value]
-    raise InputError("no cell array with columns t and x", where=str(path), value=sorted(contents))
+    if "t" in contents and "x" in contents:
+        return [(contents["t"], contents["x"])]
+    own = sorted(name for name in contents if not name.startswith("__"))
+    raise InputError("neither a cell array with columns t and x, nor t and x", where=str(path), value=own)
 
 
 def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
@@ -118,7 +121,10 @@ def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
             if isinstance(item, h5py.Dataset) and item.dtype == h5py.ref_dtype and item.ndim == 2 and name[0] != "#":
                 # MATLAB stores arrays transposed: cell (n, 2) appears as (2, n), x (n_sensor, n_time) as its transpose.
                 return [(file[item[0, k]][()], file[item[1, k]][()].T) for k in range(item.shape[1])]
-    raise InputError("no cell array with columns t and x", where=str(path))
+        if "t" in file and "x" in file:
+            return [(file["t"][()], file["x"][()].T)]
+        own = sorted(name for name in file if name[0] != "#")
+    raise InputError("neither a cell array with columns t and x, nor t and x", where=str(path), value=own)
 
 
 def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:

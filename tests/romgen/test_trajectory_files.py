@@ -87,6 +87,25 @@ def test_mat_v73_cells(tmp_path: Path) -> None:
     assert np.array_equal(read.displacement, X)
 
 
+@pytest.mark.parametrize("hdf5", [False, True])
+def test_mat_with_one_motion(tmp_path: Path, hdf5: bool) -> None:
+    if hdf5:
+        with h5py.File(tmp_path / "a.mat", "w") as file:
+            file["t"], file["x"] = T[:, None], X  # as MATLAB stores (n_sensor, n_time)
+    else:
+        scipy.io.savemat(tmp_path / "a.mat", {"t": T, "x": X.T})
+    (read,) = read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
+    assert np.array_equal(read.displacement, X)
+
+
+def test_mat_without_t_and_x(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "a.mat", {"time": T, "y": X})
+    with pytest.raises(
+        InputError, match=r"neither a cell array with columns t and x, nor t and x; got \['time', 'y'\]"
+    ):
+        read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
+
+
 def test_csv_units_of_the_header(tmp_path: Path) -> None:
     rows = ["t [ms], upper [mm], other, lower [m]"]
     rows += [f"{1e3 * t!r},{1e3 * x[1]!r},7,{x[0]!r}" for t, x in zip(T.tolist(), X.tolist(), strict=True)]
