@@ -166,7 +166,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     rom_outputs_tangent(s->memory.z, d.dz, &s->workspace, &dout);
     for (size_t k = 0; k < n_unknown; ++k) {
         const size_t i = unknown[k] - VR_RATE;
-        dv_unknown[k] = is_output(unknown[k]) ? rom_output_tangent(&dout, d.du, unknown[k])
+        dv_unknown[k] = is_output(unknown[k]) ? rom_output_part(&dout, d.du, unknown[k])
                                               : (i % 2 == 0 ? drate[i / 2].re : drate[i / 2].im);
     }
     return fmi2OK;
@@ -190,6 +190,6 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     for (size_t i = 0; i < N_INPUT_STORED; ++i)
         slope[i] = s->memory.input_gain * s->memory.input_derivative[i];
     for (size_t k = 0; k < n; ++k)
-        value[k] = rom_output_tangent(&dout, slope, vr[k]);
+        value[k] = rom_output_part(&dout, slope, vr[k]);
     return fmi2OK;
 }

@@ -67,7 +67,7 @@ static double sensor(rom_instance *s, size_t k)
     if ((s->known & KNOWN_CHART) == 0)
         rom_chart(s->memory.z, &s->workspace);
     if ((s->known & kind) == 0)
-        rom_sensors(&s->workspace, first, s->output.sensor + first);
+        rom_sensors(&s->workspace, first, first + N_SENSOR, s->output.sensor);
     s->known |= KNOWN_CHART | kind;
     return s->output.sensor[k];
 }
@@ -125,17 +125,17 @@ static double base_motion(const rom_memory *memory, size_t k)
     return rom_base_share(k % N_SENSOR) * memory->input_gain * memory->input[ABSOLUTE_OUTPUTS ? input : 0];
 }
 
-double rom_output_tangent(const rom_output *dout, const double du[], fmi2ValueReference vr)
+double rom_output_part(const rom_output *out, const double u[], fmi2ValueReference vr)
 {
     if (vr < VR_ABSOLUTE)
-        return dout->sensor[vr - VR_SENSOR];
+        return out->sensor[vr - VR_SENSOR];
     if (vr < VR_AMPLITUDE) {
         const size_t k = vr - VR_ABSOLUTE, input = k < N_SENSOR ? N_INPUT : N_INPUT + 1;
-        return dout->sensor[k] + rom_base_share(k % N_SENSOR) * du[ABSOLUTE_OUTPUTS ? input : 0];
+        return out->sensor[k] + rom_base_share(k % N_SENSOR) * u[ABSOLUTE_OUTPUTS ? input : 0];
     }
     if (vr < VR_PHASE)
-        return dout->amplitude[vr - VR_AMPLITUDE];
-    return vr < VR_TRUST_RATIO ? dout->phase[vr - VR_PHASE] : dout->trust_ratio;
+        return out->amplitude[vr - VR_AMPLITUDE];
+    return vr < VR_TRUST_RATIO ? out->phase[vr - VR_PHASE] : out->trust_ratio;
 }
 
 void rom_update_start(rom_instance *s)
@@ -157,21 +157,17 @@ double rom_get_real(rom_instance *s, fmi2ValueReference vr)
     }
     if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return s->memory.input[vr - VR_INPUT];
-    if (vr < VR_ABSOLUTE)
-        return sensor(s, vr - VR_SENSOR);
-    if (vr < VR_AMPLITUDE)
-        return sensor(s, vr - VR_ABSOLUTE) + base_motion(&s->memory, vr - VR_ABSOLUTE);
-    if (vr < VR_PHASE)
-        return amplitudes(s)->amplitude[vr - VR_AMPLITUDE];
-    if (vr < VR_TRUST_RATIO)
-        return amplitudes(s)->phase[vr - VR_PHASE];
+    if (vr < VR_AMPLITUDE) {
+        const size_t k = vr - (vr < VR_ABSOLUTE ? VR_SENSOR : VR_ABSOLUTE);
+        return sensor(s, k) + (vr < VR_ABSOLUTE ? 0.0 : base_motion(&s->memory, k));
+    }
+    if (vr <= VR_TRUST_RATIO)
+        return rom_output_part(amplitudes(s), NULL, vr);
     if (rom_in_block(vr, VR_START, N_START))
         return s->memory.start[vr - VR_START];
     if (rom_in_block(vr, VR_START_MISFIT, START_FROM_SENSORS))
         return s->memory.start_misfit;
     switch (vr) {
-    case VR_TRUST_RATIO:
-        return amplitudes(s)->trust_ratio;
     case VR_INPUT_GAIN:
         return s->memory.input_gain;
     case VR_TRUST_RADIUS:

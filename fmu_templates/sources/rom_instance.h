@@ -118,8 +118,8 @@ int rom_beyond_hard_limit(const rom_instance *s, double ratio);
 /* With START_FROM_SENSORS, puts the state where the sensors best show the start values; does nothing otherwise. */
 void rom_update_start(rom_instance *s);
 
-/* d outputs along dz and, for the absolute ones, along du (all inputs, after the gain), in the order of the outputs. */
-double rom_output_tangent(const rom_output *dout, const double du[], fmi2ValueReference vr);
+/* Real output vr of `out`, values or their change; the absolute ones add that of the base, from all inputs after the gain. */
+double rom_output_part(const rom_output *out, const double u[], fmi2ValueReference vr);
 
 double rom_get_real(rom_instance *s, fmi2ValueReference vr);
 int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value);

@@ -117,40 +117,37 @@ static void real_tangents(const rom_run run[], size_t n_run, const double p[], d
 static void chart_rows(const rom_tables *t, const rom_complex p[], double y[])
 {
     double sum[2][N_REDUCED] = {{0.0}};
-    size_t k = 0;
-    for (; k + 1 < N_CHART_MONOMIAL; k += 2)
+    size_t k = N_CHART_MONOMIAL % 2;
+    for (size_t l = 0; k > 0 && l < N_REDUCED; ++l)
+        sum[0][l] = t->chart_re[0][l] * p[0].re - t->chart_im[0][l] * p[0].im;
+    for (; k < N_CHART_MONOMIAL; k += 2)
         for (size_t e = 0; e < 2; ++e)
             for (size_t l = 0; l < N_REDUCED; ++l)
                 sum[e][l] += t->chart_re[k + e][l] * p[k + e].re - t->chart_im[k + e][l] * p[k + e].im;
-    for (size_t l = 0; l < N_REDUCED; ++l) {
+    for (size_t l = 0; l < N_REDUCED; ++l)
         y[l] = sum[0][l] + sum[1][l];
-        if (k < N_CHART_MONOMIAL)
-            y[l] += t->chart_re[k][l] * p[k].re - t->chart_im[k][l] * p[k].im;
-    }
 }
 
 /* a . b in four sums, as above; arrays of two, which compilers take for vectors */
 static double dot(const double a[], const double b[], size_t n)
 {
     double even[2] = {0.0, 0.0}, odd[2] = {0.0, 0.0};
-    size_t k = 0;
-    for (; k + 3 < n; k += 4) {
+    size_t k = n % 4;
+    for (size_t e = 0; e < k; ++e)
+        even[0] += a[e] * b[e];
+    for (; k < n; k += 4) {
         even[0] += a[k] * b[k];
         even[1] += a[k + 1] * b[k + 1];
         odd[0] += a[k + 2] * b[k + 2];
         odd[1] += a[k + 3] * b[k + 3];
     }
-    for (size_t e = 0; e < 2; ++e)
-        even[e] += odd[e];
-    for (; k < n; ++k)
-        even[0] += a[k] * b[k];
-    return even[0] + even[1];
+    return (even[0] + odd[0]) + (even[1] + odd[1]);
 }
 
-static void sensor_rows(const rom_tables *t, const double p[], size_t first, double x[])
+static void sensor_rows(const rom_tables *t, const double p[], size_t first, size_t end, double x[])
 {
-    for (size_t i = 0; i < N_SENSOR; ++i)
-        x[i] = dot(t->sensor[first + i], p, N_SENSOR_MONOMIAL);
+    for (size_t i = first; i < end; ++i)
+        x[i] = dot(t->sensor[i], p, N_SENSOR_MONOMIAL);
 }
 
 void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
@@ -171,8 +168,7 @@ void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_com
 void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
                       rom_complex drate[])
 {
-    pair_with_conjugate(z, w->form);
-    complex_monomials(form_product, N_FORM_PRODUCT, form_pair, N_FORM_PAIR, w->form);
+    rom_nonlinear_rate(z, du, w, drate); /* for the monomials */
     pair_with_conjugate(dz, w->form_tangent);
     complex_tangents(form_product, N_FORM_PRODUCT, form_pair, N_FORM_PAIR, w->form, w->form_tangent);
     normal_form_rows(&w->tables, w->form_tangent, drate);
@@ -189,9 +185,9 @@ void rom_chart(const rom_complex z[], rom_workspace *w)
     real_monomials(sensor_run, N_SENSOR_RUN, w->sensor);
 }
 
-void rom_sensors(const rom_workspace *w, size_t first, double x[])
+void rom_sensors(const rom_workspace *w, size_t first, size_t end, double x[])
 {
-    sensor_rows(&w->tables, w->sensor, first, x);
+    sensor_rows(&w->tables, w->sensor, first, end, x);
 }
 
 void rom_amplitudes(const rom_complex z[], rom_output *out)
@@ -238,8 +234,7 @@ void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_work
     complex_tangents(chart_product, N_CHART_PRODUCT, chart_pair, N_CHART_PAIR, w->chart, w->chart_tangent);
     chart_rows(&w->tables, w->chart_tangent, w->sensor_tangent);
     real_tangents(sensor_run, N_SENSOR_RUN, w->sensor, w->sensor_tangent);
-    sensor_rows(&w->tables, w->sensor_tangent, 0, dout->sensor);
-    sensor_rows(&w->tables, w->sensor_tangent, N_SENSOR, dout->sensor + N_SENSOR);
+    sensor_rows(&w->tables, w->sensor_tangent, 0, N_SENSOR_ROW, dout->sensor);
     amplitude_tangents(z, dz, dout);
 }
 

@@ -74,8 +74,8 @@ void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const doubl
 /* y/s = Re(T zeta^E) and its monomials, kept in the workspace */
 void rom_chart(const rom_complex z[], rom_workspace *w);
 
-/* N_SENSOR rows of the sensors from row `first` on, 0 for displacements, N_SENSOR for velocities; after rom_chart */
-void rom_sensors(const rom_workspace *w, size_t first, double x[]);
+/* Rows first .. end - 1 of the sensors x: N_SENSOR displacements, then as many velocities; after rom_chart */
+void rom_sensors(const rom_workspace *w, size_t first, size_t end, double x[]);
 
 /* |z_j|, arg z_j and the trust ratio */
 void rom_amplitudes(const rom_complex z[], rom_output *out);

@@ -22,7 +22,7 @@
 #define rom_sensor_size ROM_NAME(rom_sensor_size)
 #define rom_find_start ROM_NAME(rom_find_start)
 #define rom_update_start ROM_NAME(rom_update_start)
-#define rom_output_tangent ROM_NAME(rom_output_tangent)
+#define rom_output_part ROM_NAME(rom_output_part)
 #define rom_fill_tables ROM_NAME(rom_fill_tables)
 #define rom_resource_path ROM_NAME(rom_resource_path)
 #define rom_etdrk4_prepare ROM_NAME(rom_etdrk4_prepare)
