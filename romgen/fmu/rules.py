@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 
 from romgen.errors import InputError
 from romgen.fmu.rules3 import RULES3, archive_problems3
-from romgen.fmu.rules_common import applied, binary_rules, identity_rules
+from romgen.fmu.rules_of_both import applied, binary_rules, identity_rules
 from romgen.fmu.rules_structure import structure_rules
 from romgen.fmu.rules_types import UNTYPED, alias_rules, initial_of, limits, repeated, type_rules, value_of
 

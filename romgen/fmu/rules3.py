@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from romgen.fmu.rules_common import Rule, binary_rules, identity_rules
+from romgen.fmu.rules_of_both import Rule, binary_rules, identity_rules
 from romgen.fmu.rules_types import limits, repeated
 
 FLOATS = {"Float32", "Float64"}
