@@ -39,7 +39,7 @@ int rom_permits(const rom_instance *s, int modes, const char *function)
         return 0;
     if (((int)s->memory.mode & modes) != 0)
         return 1;
-    rom_refuse(s, function, "this function may not be called in the present mode of the FMI 2.0 state machine");
+    rom_refuse(s, function, "this function may not be called in the present mode of the FMI state machine");
     return 0;
 }
 

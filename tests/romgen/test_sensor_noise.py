@@ -35,6 +35,14 @@ def test_noise_is_averaged_by_windows(noise: float, delays: bool) -> None:
     assert any("too noisy for 2 modes" in note for note in _chart_notes(motions, chart)) == delays
 
 
+def test_coarse_sampling_is_noted() -> None:
+    """4 ms alias both modes; 1 ms leaves 4.5 samples in a period of the second."""
+    for stride, few in ((1, False), (5, True), (20, True)):
+        motions = [Trajectory(m.name, m.t[::stride], m.sensors, m.displacement[::stride]) for m in decays(0.0)]
+        notes = list(_chart_notes(motions, learn_sensor_chart(motions, 2)))
+        assert any("samples in a period" in note for note in notes) == few
+
+
 def test_growing_motions_are_still_refused() -> None:
     with pytest.raises(NumericalError, match="not that of decaying oscillations"):
         learn_sensor_chart(decays(0.0, growth=0.5), 2)
