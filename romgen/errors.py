@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+
 
 class RomgenError(Exception):
     """Base of all failures that a user sees as one line, never as a stack trace.
@@ -20,7 +22,8 @@ class RomgenError(Exception):
         self.what, self.where, self.value, self.advice = what, where, value, advice
         parts = [f"{where}: {what}" if where else what]
         if value is not None:
-            parts.append(f"got {value if isinstance(value, str) else repr(value)}")
+            shown = value if isinstance(value, str) else " ".join(repr(value).split())  # long arrays break lines
+            parts.append(f"got {shown}")
         if advice:
             parts.append(advice)
         super().__init__("; ".join(parts))
@@ -60,3 +63,10 @@ class StoreError(RomgenError):
     """A result file that is truncated, of another schema, or not writable (exit code 2)."""
 
     exit_code = 2
+
+
+def system_error(error: OSError) -> StoreError:
+    """Say in one line what the system refused: no permission, no such folder, no space left."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    advice = "make room; what was finished is kept" if full else "check the path and its permissions"
+    return StoreError(error.strerror or str(error), where=str(error.filename or ""), advice=advice)

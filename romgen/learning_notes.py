@@ -16,6 +16,8 @@ from romgen.trajectory_error import TrajectoryError
 
 # Share of the largest motion; an offset of one percent is as large as the error aimed at.
 NOTED_REST_PERCENT = 1.0
+# Differences of order 8 err by (2 pi / 7)^8 / 630 = 7e-4 of a derivative with so many samples in a period.
+SAMPLES_PER_PERIOD = 7.0
 # Starts that the training motions nearly reach are not worth a note.
 NOTED_DISTANCE = 1.05
 
@@ -49,8 +51,17 @@ def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) 
     for trajectory in trajectories:
         if not is_uniform(trajectory.t, chart.step):
             yield f"trajectory '{trajectory.name}' was resampled to a step of {chart.step:.6g} s"
+    samples = 1.0 / (chart.step * float(np.max(chart.frequency_hz)))
+    if samples < SAMPLES_PER_PERIOD:
+        yield (
+            f"the fastest mode found, {np.max(chart.frequency_hz):.4g} Hz, has only {samples:.2g} samples in a period: "
+            "derivatives are wrong, and faster modes may pass for slower ones; sample faster"
+        )
     if chart.delays > 1:
-        yield f"too few sensors for {len(chart.frequency_hz)} modes: {chart.delays} delays were used"
+        n_mode = len(chart.frequency_hz)
+        few = chart.projection.shape[1] // chart.delays < n_mode
+        why = f"too few sensors for {n_mode} modes" if few else f"sensors too similar or too noisy for {n_mode} modes"
+        yield f"{why}: {chart.delays} delays were used"
 
 
 def choice_sentence(orders: OrderTable) -> str:

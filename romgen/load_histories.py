@@ -84,16 +84,16 @@ def load_samples(name: str, table: LoadHistorySettings) -> LoadSamples:
 
 def _read(path: Path, where: str) -> tuple[FloatArray, FloatArray]:
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("cannot read the load history", where=where, value=str(path)) from error
     rows = []
     for number, line in enumerate(lines, 1):
-        cells = line.replace(";", ",").split(",")
+        cells = _cells(line)
         try:
-            time, value = (float(cell) for cell in cells)
+            time, value = map(float, cells)
         except ValueError as error:
-            if number == 1 or not line.strip():
+            if not line.strip() or (number == 1 and not any(map(_is_number, cells))):  # a header
                 continue
             advice = "write two columns, time and value, separated by a comma"
             raise InputError(
@@ -102,6 +102,20 @@ def _read(path: Path, where: str) -> tuple[FloatArray, FloatArray]:
         rows.append((time, value))
     table = np.array(rows).reshape(-1, 2)
     return table[:, 0], table[:, 1]
+
+
+def _cells(line: str) -> list[str]:
+    """Parted by semicolons or tabs, with decimal points or commas, or by commas."""
+    separator = next((mark for mark in (";", "\t") if mark in line), ",")
+    return [cell if separator == "," else cell.replace(",", ".") for cell in line.split(separator)]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def history_motion(tables: dict[str, LoadHistorySettings], n_dof: int, step: float) -> ForcedMotion:

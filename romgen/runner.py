@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from romgen.errors import InputError
@@ -29,6 +29,7 @@ class RunResult:
     computed, reused : names of the stages, in order.
     infos : time, memory and messages of every stage that is stored and up to date, reused and later ones too.
     context : gives the record of each stage: ``result.context.record("learn", Learned)``.
+    messages : what was wrong with the stored results: damaged files that were moved aside.
     """
 
     run_dir: Path
@@ -36,6 +37,7 @@ class RunResult:
     reused: tuple[str, ...]
     infos: dict[str, StageInfo]
     context: Context
+    messages: tuple[str, ...] = ()
 
 
 def execute(
@@ -66,10 +68,12 @@ def execute(
     wanted = stages if until is None else stages[: names.index(until) + 1]
     keys = stage_keys(stages, study)
     with locked(run_dir), _log_file(run_dir / "run.log"):
-        store = ResultStore(run_dir)
+        with _messages() as messages:
+            store = ResultStore(run_dir)
         try:
             context = Context(study, run_dir, store, keys)
-            return _run(wanted, context, store, keys, (force, progress or SilentProgress()))
+            result = _run(wanted, context, store, keys, (force, progress or SilentProgress()))
+            return replace(result, messages=tuple(messages))
         finally:
             store.consolidate(keys)
             with suppress(OSError):  # not there, or a stage that failed keeps its segments in it

@@ -28,6 +28,7 @@ def learn_sensor_chart(training: Sequence[Trajectory], n_mode: int) -> SensorCha
 
     With at least n_mode informative sensors the principal displacements u and u' are the state of the linear fit,
     otherwise the 2 n_mode principal components of delay windows. The eigenvectors of its linear part give P.
+    Differences enlarge noise and windows average it: where the first fit finds no decaying modes, windows are tried.
 
     Parameters
     ----------
@@ -44,9 +45,15 @@ def learn_sensor_chart(training: Sequence[Trajectory], n_mode: int) -> SensorCha
     stacked = np.vstack(samples)
     shapes = principal_directions(stacked.T @ stacked)
     strength = np.sqrt(np.mean((stacked @ shapes) ** 2, axis=0))
-    if int((strength > INFORMATIVE * strength[0]).sum()) >= n_mode:
+    if int((strength > INFORMATIVE * strength[0]).sum()) < n_mode:
+        return _delay_chart(samples, n_mode, step)
+    try:
         return _displacement_chart(samples, shapes[:, :n_mode], step)
-    return _delay_chart(samples, n_mode, step)
+    except NumericalError as noisy:
+        try:
+            return _delay_chart(samples, n_mode, step)
+        except (InputError, NumericalError):
+            raise noisy from None
 
 
 def principal_directions(gram: FloatArray) -> FloatArray:
@@ -72,7 +79,7 @@ def linear_modes(c: FloatArray, c_dot: FloatArray) -> tuple[ComplexArray, Comple
             "the linear dynamics of the sensors are not that of decaying oscillations",
             where="sensor chart",
             value=np.array2string(eigenvalues, precision=4),
-            advice="check the number of master modes, units and sampling, or give longer decays",
+            advice="check the number of master modes, units, sampling and noise, or give longer decays",
         )
     order = upper[np.argsort(eigenvalues.imag[upper])]
     return eigenvalues[order].astype(complex), (scale[:, None] * vectors[:, order]).astype(complex)

@@ -163,7 +163,8 @@ def open_for_reading(path: Path) -> Iterator[h5py.File]:
                 raise StoreError("is not a romgen file", where=str(path))
             yield file
     except (OSError, RuntimeError) as error:
-        raise StoreError(f"truncated, damaged or not HDF5 ({error})", where=str(path)) from error
+        advice = "a run with --force computes its results anew"
+        raise StoreError(f"truncated, damaged or not HDF5 ({error})", where=str(path), advice=advice) from error
 
 
 def replace_atomically(path: Path, write: Callable[[Path], None]) -> None:

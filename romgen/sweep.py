@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from romgen.errors import InputError, RomgenError
+from romgen.errors import InputError, RomgenError, system_error
 from romgen.executor import Executor
 from romgen.pipeline import run
 from romgen.settings import load_study
@@ -37,8 +37,9 @@ def run_job(job: SweepJob) -> SweepResult:
     """Bring one study up to date; a failure is a result, so that it does not end the others."""
     try:
         run(load_study(Path(job.study)), Path(job.run_dir))
-    except RomgenError as error:
-        return SweepResult(job.study, job.run_dir, None, str(error), error.exit_code)
+    except (RomgenError, OSError) as error:
+        told = system_error(error) if isinstance(error, OSError) else error
+        return SweepResult(job.study, job.run_dir, None, str(told), told.exit_code)
     summary = json.loads((Path(job.run_dir) / "summary.json").read_text(encoding="utf-8"))
     return SweepResult(job.study, job.run_dir, summary, "", 0)
 

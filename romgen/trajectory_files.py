@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,9 @@ import scipy.io
 
 from romgen.arrays import FloatArray
 from romgen.errors import InputError
-from romgen.settings.quantities import UNITS
+from romgen.settings.quantities import unit_factor
 from romgen.trajectory import Trajectory
+from romgen.trajectory_csv import read_csv
 
 Pair = tuple[str, FloatArray, FloatArray]
 
@@ -24,15 +24,15 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
 
     Parameters
     ----------
-    files : .mat (cell array with columns t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and .npz (as
-        written by ``write_trajectories``, or NPZ arrays t and x), .csv (header "t [s], name [mm], ...").
+    files : .mat (cell array with columns t and x, or t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and
+        .npz (as written by ``write_trajectories``, or t and x alone), .csv (``romgen.trajectory_csv``).
     sensors : names of the rows of x; CSV columns are found by these names.
     unit : unit of displacement where the file has none, e.g. "m" or "mm".
 
     Raises
     ------
     InputError : names file, trajectory, row and value: unknown unit, not readable, wrong number of sensors, NaN,
-        time that does not increase, a constant sensor.
+        time that does not increase, a constant sensor, motions about another position than 0.
     """
     _factor(unit, "[data] unit")
     trajectories: list[Trajectory] = []
@@ -50,6 +50,8 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
             raise
         except Exception as error:  # h5py, numpy, scipy and zipfile each raise their own for a damaged file
             raise InputError(f"truncated, damaged or of another format ({error})", where=str(path)) from error
+        if not pairs:
+            raise InputError("holds no trajectory", where=str(path), advice="it needs arrays t and x")
         for name, t, x in pairs:
             where = f"{path.name}, trajectory '{name}'"
             _check(t, x, sensors, where)
@@ -77,12 +79,15 @@ def write_trajectories(path: Path, trajectories: Iterable[Trajectory]) -> None:
 
 
 def _factor(unit: str, where: str) -> float:
-    if unit not in UNITS["m"]:
-        raise InputError("unknown unit", where=where, value=unit, advice=f"use one of {', '.join(UNITS['m'])}")
-    return UNITS["m"][unit]
+    try:
+        return unit_factor(unit, "m")
+    except ValueError as error:
+        raise InputError(str(error), where=where) from error
 
 
-def _time_first(x: FloatArray, n_time: int) -> FloatArray:
+def _time_first(x: Any, n_time: int) -> FloatArray:
+    if np.iscomplexobj(x):
+        raise ValueError("x is complex, displacements are real")
     x = np.atleast_2d(np.asarray(x, dtype=np.float64))
     return np.ascontiguousarray(x if x.shape[0] == n_time else x.T)
 
@@ -104,7 +109,10 @@ def _mat_v5(path: Path) -> list[tuple[FloatArray, FloatArray]]:
     for value in contents.values():
         if isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 2 and value.shape[1] >= 2:
             return [(row[0], row[1]) for row in value]
-    raise InputError("no cell array with columns t and x", where=str(path), value=sorted(contents))
+    if "t" in contents and "x" in contents:
+        return [(contents["t"], contents["x"])]
+    own = sorted(name for name in contents if not name.startswith("__"))
+    raise InputError("neither a cell array with columns t and x, nor t and x", where=str(path), value=own)
 
 
 def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
@@ -113,24 +121,41 @@ def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
             if isinstance(item, h5py.Dataset) and item.dtype == h5py.ref_dtype and item.ndim == 2 and name[0] != "#":
                 # MATLAB stores arrays transposed: cell (n, 2) appears as (2, n), x (n_sensor, n_time) as its transpose.
                 return [(file[item[0, k]][()], file[item[1, k]][()].T) for k in range(item.shape[1])]
-    raise InputError("no cell array with columns t and x", where=str(path))
+        if "t" in file and "x" in file:
+            return [(file["t"][()], file["x"][()].T)]
+        own = sorted(name for name in file if name[0] != "#")
+    raise InputError("neither a cell array with columns t and x, nor t and x", where=str(path), value=own)
 
 
 def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
     with h5py.File(path) as file:
+        if isinstance(file.get("t"), h5py.Dataset) and isinstance(file.get("x"), h5py.Dataset):
+            return [_group_pair(path.stem, file, sensors, unit)]
         pairs = []
         for name, group in file.items():
             if not isinstance(group, h5py.Group) or "t" not in group or "x" not in group:
                 raise InputError("group without t and x", where=f"{path.name}/{name}")
-            stored = group["x"].attrs.get("unit", unit)
-            x = _factor(str(stored), path.name) * np.asarray(group["x"], dtype=np.float64)
-            pairs.append((str(name), np.asarray(group["t"], dtype=np.float64), x))
+            pairs.append(_group_pair(str(name), group, sensors, unit))
     return pairs
+
+
+def _group_pair(name: str, group: h5py.Group, sensors: Sequence[str], unit: str) -> Pair:
+    """Return t and x of a group; where it names its sensors and the study names one of them, they are found by name."""
+    t = np.asarray(group["t"], dtype=np.float64).ravel()
+    where = f"{Path(group.file.filename).name}, trajectory '{name}'"
+    x = _factor(str(group["x"].attrs.get("unit", unit)), where) * _time_first(group["x"][()], t.size)
+    own = [str(sensor) for sensor in group.attrs.get("sensors", ())]
+    if not set(own) & set(sensors):
+        return name, t, x
+    missing = [sensor for sensor in sensors if sensor not in own]
+    if missing:
+        raise InputError("no such sensor", where=where, value=missing[0], advice=f"the file has {', '.join(own)}")
+    return name, t, x[:, [own.index(sensor) for sensor in sensors]]
 
 
 def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
     with path.open("rb") as file, np.load(file) as arrays:
-        names = sorted({key.rpartition("/")[0] for key in arrays.files if key.endswith("t")})
+        names = sorted({key.rpartition("/")[0] for key in arrays.files if key.rpartition("/")[2] == "t"})
         pairs = []
         for name in names:
             prefix = f"{name}/" if name else ""
@@ -143,39 +168,6 @@ def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
     return pairs
 
 
-def _read_csv(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.reader(file) if row]
-    if len(rows) < 2:
-        raise InputError("no data rows", where=str(path))
-    heads = [_head(cell) for cell in rows[0]]
-    names = [name for name, _ in heads]
-    columns = []
-    for wanted, kind, default in [("t", "s", "s"), *((sensor, "m", unit) for sensor in sensors)]:
-        if wanted not in names:
-            raise InputError(
-                f"no column '{wanted}'", where=path.name, value=names, advice="header: t [s], name [mm], ..."
-            )
-        symbol = heads[names.index(wanted)][1] or default
-        if symbol not in UNITS[kind]:
-            raise InputError("unknown unit", where=f"{path.name}, column '{wanted}'", value=symbol)
-        columns.append((names.index(wanted), UNITS[kind][symbol]))
-    table = np.array([[_number(row, k, line, path) * f for k, f in columns] for line, row in enumerate(rows[1:], 2)])
-    return [(path.stem, table[:, 0].copy(), np.ascontiguousarray(table[:, 1:]))]
-
-
-def _head(cell: str) -> tuple[str, str]:
-    name, _, rest = cell.partition("[")
-    return name.strip(), rest.rstrip("] \t").strip()
-
-
-def _number(row: list[str], column: int, line: int, path: Path) -> float:
-    try:
-        return float(row[column])
-    except (IndexError, ValueError) as error:
-        raise InputError("not a number", where=f"{path.name}, line {line}, column {column + 1}", value=row) from error
-
-
 def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> None:
     if x.ndim != 2 or x.shape != (t.size, len(sensors)):
         raise InputError(
@@ -184,6 +176,8 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
             value=x.shape,
             advice=f"expected {(t.size, len(sensors))}",
         )
+    if t.size < 2:
+        raise InputError("too few samples for a motion", where=where, value=t.size)
     bad = ~np.isfinite(np.column_stack([t, x]))
     if bad.any():
         row, column = map(int, np.argwhere(bad)[0])
@@ -196,7 +190,15 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
     constant = np.flatnonzero(np.ptp(x, axis=0) == 0)
     if constant.size:
         raise InputError(
-            "the sensor is constant", where=f"{where}, sensor '{sensors[constant[0]]}'", value=x[0, constant[0]]
+            "the sensor is constant", where=f"{where}, sensor '{sensors[constant[0]]}'", value=float(x[0, constant[0]])
+        )
+    # One sensor may move to one side only, as the axial one of a beam does; all of them do not.
+    if np.all((x.min(axis=0) > 0.0) | (x.max(axis=0) < 0.0)):
+        raise InputError(
+            "no sensor ever crosses 0, but displacements count from the position of rest",
+            where=where,
+            value=f"mean {np.mean(x[:, 0]):.4g} m of '{sensors[0]}'",
+            advice="subtract what each sensor shows at rest",
         )
 
 
@@ -213,5 +215,5 @@ _READERS: dict[str, Callable[[Path, Sequence[str], str], list[Pair]]] = {
     ".h5": _read_hdf5,
     ".hdf5": _read_hdf5,
     ".npz": _read_npz,
-    ".csv": _read_csv,
+    ".csv": read_csv,
 }

@@ -123,10 +123,11 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
     rom_instance *s = c;
     if (!rom_permits(s, MODE_INITIALIZATION, "fmi2ExitInitializationMode"))
         return fmi2Error;
-    if (rom_beyond_hard_limit(s, s->memory.z))
+    const double ratio = rom_trust_ratio(s->memory.z);
+    if (rom_beyond_hard_limit(s, ratio))
         return rom_fail(s, "fmi2ExitInitializationMode", "the start state lies beyond hard_limit times the trained range");
     s->memory.mode = s->memory.kind == (double)fmi2CoSimulation ? MODE_STEP_COMPLETE : MODE_EVENT;
-    return rom_check_trust(s);
+    return rom_check_trust(s, ratio);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c)

@@ -38,8 +38,11 @@ static void sample(rom_instance *s, double tau, double u[])
     if (s->request_inputs == NULL)
         input_at(&s->memory, tau, u);
     else {
-        if (tau > 0.0)
+        if (tau > 0.0) {
+            s->memory.mode = MODE_WITHIN_STEP;
             s->request_inputs(s->importer, s->memory.time + tau);
+            s->memory.mode = MODE_STEP_COMPLETE;
+        }
         input_at(&s->memory, 0.0, u);
     }
 }
@@ -51,10 +54,11 @@ static double sub_step_count(const rom_memory *memory, double step)
     return n < 1.0 ? 1.0 : n;
 }
 
-/* Integrates over `step` in place on a copy of the state; NULL, or the reason of a failure. */
-static const char *integrate(rom_instance *s, double step, rom_complex z[])
+/* Integrates over `step` in n sub-steps in place on a copy of the state; NULL, or the reason of a failure. `ratio`
+   becomes the trust ratio at the end. */
+static const char *integrate(rom_instance *s, double step, double n, rom_complex z[], double *ratio)
 {
-    const double n = sub_step_count(&s->memory, step), h = step / n;
+    const double h = step / n;
     double u_start[N_INPUT_STORED], u_middle[N_INPUT_STORED], u_end[N_INPUT_STORED];
     rom_etdrk4_prepare(&s->integrator, h);
     for (double k = 0.0; k < n; k += 1.0) {
@@ -62,9 +66,10 @@ static const char *integrate(rom_instance *s, double step, rom_complex z[])
         sample(s, (k + 0.5) * h, u_middle);
         sample(s, (k + 1.0) * h, u_end);
         rom_etdrk4_step(&s->integrator, u_start, u_middle, u_end, &s->workspace, z);
-        if (!rom_is_finite(rom_trust_ratio(z)))
+        *ratio = rom_trust_ratio(z);
+        if (!rom_is_finite(*ratio))
             return "the state became infinite or undefined; the state of the last communication point is kept";
-        if (rom_beyond_hard_limit(s, z))
+        if (rom_beyond_hard_limit(s, *ratio))
             return "trust_ratio exceeds hard_limit; the state of the last communication point is kept";
     }
     return NULL;
@@ -84,6 +89,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi
     rom_complex z[N_MODE];
     double input[N_INPUT_STORED];
     const double time = s != NULL ? s->memory.time : 0.0;
+    double ratio = 0.0;
     (void)no_set_state_prior; /* nothing is kept for a possible rollback: states are copied on request */
     if (!rom_permits(s, MODE_STEP_COMPLETE, "fmi2DoStep"))
         return fmi2Error;
@@ -92,12 +98,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi
     if (s->memory.stop_time_defined != 0.0 &&
         current_time + step > s->memory.stop_time + time_slack(s->memory.stop_time, step))
         return rom_refuse(s, "fmi2DoStep", "the step passes the stop time given to fmi2SetupExperiment");
-    if (sub_step_count(&s->memory, step) > MAX_SUB_STEPS)
+    const double n = sub_step_count(&s->memory, step);
+    if (n > MAX_SUB_STEPS)
         return rom_refuse(s, "fmi2DoStep", "the communication step holds more than 1e7 internal steps");
     memcpy(z, s->memory.z, sizeof z);
     memcpy(input, s->memory.input, sizeof input);
     s->memory.time = current_time;
-    const char *reason = integrate(s, step, z);
+    const char *reason = integrate(s, step, n, z, &ratio);
     if (reason != NULL) {
         s->memory.time = time;
         memcpy(s->memory.input, input, sizeof input);
@@ -108,7 +115,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current_time, fmi2Real step, fmi
         s->memory.input[i] += s->memory.input_derivative[i] * step;
     s->memory.time = current_time + step;
     rom_invalidate(s);
-    return rom_check_trust(s);
+    return rom_check_trust(s, ratio);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c)

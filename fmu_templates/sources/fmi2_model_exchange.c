@@ -61,9 +61,10 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state
         return rom_refuse(s, "fmi2CompletedIntegratorStep", "the address of a result is NULL");
     *enter_event_mode = fmi2False;
     *terminate = fmi2False;
-    if (rom_beyond_hard_limit(s, s->memory.z))
+    const double ratio = rom_trust_ratio(s->memory.z);
+    if (rom_beyond_hard_limit(s, ratio))
         return rom_fail(s, "fmi2CompletedIntegratorStep", "trust_ratio exceeds hard_limit");
-    return rom_check_trust(s);
+    return rom_check_trust(s, ratio);
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
@@ -98,7 +99,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t n)
     if (!permits_model_exchange(s, MODE_READABLE, "fmi2GetDerivatives") ||
         !is_state_vector(s, derivatives, n, "fmi2GetDerivatives"))
         return fmi2Error;
-    if (rom_beyond_hard_limit(s, s->memory.z)) {
+    if (rom_beyond_hard_limit(s, rom_trust_ratio(s->memory.z))) {
         rom_log(&s->logger, fmi2Discard, LOG_DISCARD, "fmi2GetDerivatives", "trust_ratio exceeds hard_limit");
         return fmi2Discard;
     }

@@ -67,7 +67,8 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
 {
     rom_instance *s = c;
-    if (!rom_permits(s, MODE_WRITABLE, "fmi2SetReal") || !references_exist(s, vr, n, VR_REAL_END, "fmi2SetReal"))
+    if (!rom_permits(s, MODE_WRITABLE | MODE_WITHIN_STEP, "fmi2SetReal") ||
+        !references_exist(s, vr, n, VR_REAL_END, "fmi2SetReal"))
         return fmi2Error;
     for (size_t k = 0; k < n; ++k)
         if (value == NULL || !rom_settable_real(s, vr[k], value[k]))
@@ -165,7 +166,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     rom_outputs_tangent(s->memory.z, d.dz, &s->workspace, &dout);
     for (size_t k = 0; k < n_unknown; ++k) {
         const size_t i = unknown[k] - VR_RATE;
-        dv_unknown[k] = is_output(unknown[k]) ? rom_output_tangent(&dout, d.du, unknown[k])
+        dv_unknown[k] = is_output(unknown[k]) ? rom_output_part(&dout, d.du, unknown[k])
                                               : (i % 2 == 0 ? drate[i / 2].re : drate[i / 2].im);
     }
     return fmi2OK;
@@ -189,6 +190,6 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     for (size_t i = 0; i < N_INPUT_STORED; ++i)
         slope[i] = s->memory.input_gain * s->memory.input_derivative[i];
     for (size_t k = 0; k < n; ++k)
-        value[k] = rom_output_tangent(&dout, slope, vr[k]);
+        value[k] = rom_output_part(&dout, slope, vr[k]);
     return fmi2OK;
 }

@@ -39,39 +39,51 @@ int rom_permits(const rom_instance *s, int modes, const char *function)
         return 0;
     if (((int)s->memory.mode & modes) != 0)
         return 1;
-    rom_refuse(s, function, "this function may not be called in the present mode of the FMI 2.0 state machine");
+    rom_refuse(s, function, "this function may not be called in the present mode of the FMI state machine");
     return 0;
 }
 
 void rom_invalidate(rom_instance *s)
 {
-    s->rate_is_valid = 0;
-    s->output_is_valid = 0;
+    s->known = 0;
 }
 
 void rom_update_rate(rom_instance *s)
 {
-    if (s->rate_is_valid)
+    if ((s->known & KNOWN_RATE) != 0)
         return;
     double u[N_INPUT_STORED];
     for (size_t i = 0; i < N_INPUT_STORED; ++i)
         u[i] = s->memory.input_gain * s->memory.input[i];
     rom_rate(s->memory.z, u, &s->workspace, s->rate);
-    s->rate_is_valid = 1;
+    s->known |= KNOWN_RATE;
 }
 
-static const rom_output *updated_output(rom_instance *s)
+/* Sensor row k, computed with the others of its kind */
+static double sensor(rom_instance *s, size_t k)
 {
-    if (!s->output_is_valid)
-        rom_outputs(s->memory.z, &s->workspace, &s->output);
-    s->output_is_valid = 1;
+    const size_t first = k < N_SENSOR ? 0 : N_SENSOR;
+    const unsigned kind = k < N_SENSOR ? KNOWN_DISPLACEMENT : KNOWN_VELOCITY;
+    if ((s->known & KNOWN_CHART) == 0)
+        rom_chart(s->memory.z, &s->workspace);
+    if ((s->known & kind) == 0)
+        rom_sensors(&s->workspace, first, first + N_SENSOR, s->output.sensor);
+    s->known |= KNOWN_CHART | kind;
+    return s->output.sensor[k];
+}
+
+static const rom_output *amplitudes(rom_instance *s)
+{
+    if ((s->known & KNOWN_AMPLITUDE) == 0)
+        rom_amplitudes(s->memory.z, &s->output);
+    s->known |= KNOWN_AMPLITUDE;
     return &s->output;
 }
 
-fmi2Status rom_check_trust(rom_instance *s)
+fmi2Status rom_check_trust(rom_instance *s, double ratio)
 {
     const int was_inside = s->memory.inside != 0.0;
-    const int is_inside = rom_trust_ratio(s->memory.z) <= s->memory.trust_radius;
+    const int is_inside = ratio <= s->memory.trust_radius;
     s->memory.inside = is_inside ? 1.0 : 0.0;
     if (was_inside && !is_inside) {
         const int warn = s->memory.warn_on_crossing != 0.0;
@@ -87,9 +99,9 @@ fmi2Status rom_check_trust(rom_instance *s)
     return fmi2OK;
 }
 
-int rom_beyond_hard_limit(const rom_instance *s, const rom_complex z[])
+int rom_beyond_hard_limit(const rom_instance *s, double ratio)
 {
-    return !(rom_trust_ratio(z) <= s->memory.hard_limit);
+    return !(ratio <= s->memory.hard_limit);
 }
 
 static double constant(fmi2ValueReference vr)
@@ -113,17 +125,17 @@ static double base_motion(const rom_memory *memory, size_t k)
     return rom_base_share(k % N_SENSOR) * memory->input_gain * memory->input[ABSOLUTE_OUTPUTS ? input : 0];
 }
 
-double rom_output_tangent(const rom_output *dout, const double du[], fmi2ValueReference vr)
+double rom_output_part(const rom_output *out, const double u[], fmi2ValueReference vr)
 {
     if (vr < VR_ABSOLUTE)
-        return dout->sensor[vr - VR_SENSOR];
+        return out->sensor[vr - VR_SENSOR];
     if (vr < VR_AMPLITUDE) {
         const size_t k = vr - VR_ABSOLUTE, input = k < N_SENSOR ? N_INPUT : N_INPUT + 1;
-        return dout->sensor[k] + rom_base_share(k % N_SENSOR) * du[ABSOLUTE_OUTPUTS ? input : 0];
+        return out->sensor[k] + rom_base_share(k % N_SENSOR) * u[ABSOLUTE_OUTPUTS ? input : 0];
     }
     if (vr < VR_PHASE)
-        return dout->amplitude[vr - VR_AMPLITUDE];
-    return vr < VR_TRUST_RATIO ? dout->phase[vr - VR_PHASE] : dout->trust_ratio;
+        return out->amplitude[vr - VR_AMPLITUDE];
+    return vr < VR_TRUST_RATIO ? out->phase[vr - VR_PHASE] : out->trust_ratio;
 }
 
 void rom_update_start(rom_instance *s)
@@ -145,21 +157,17 @@ double rom_get_real(rom_instance *s, fmi2ValueReference vr)
     }
     if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return s->memory.input[vr - VR_INPUT];
-    if (vr < VR_ABSOLUTE)
-        return updated_output(s)->sensor[vr - VR_SENSOR];
-    if (vr < VR_AMPLITUDE)
-        return updated_output(s)->sensor[vr - VR_ABSOLUTE] + base_motion(&s->memory, vr - VR_ABSOLUTE);
-    if (vr < VR_PHASE)
-        return updated_output(s)->amplitude[vr - VR_AMPLITUDE];
-    if (vr < VR_TRUST_RATIO)
-        return updated_output(s)->phase[vr - VR_PHASE];
+    if (vr < VR_AMPLITUDE) {
+        const size_t k = vr - (vr < VR_ABSOLUTE ? VR_SENSOR : VR_ABSOLUTE);
+        return sensor(s, k) + (vr < VR_ABSOLUTE ? 0.0 : base_motion(&s->memory, k));
+    }
+    if (vr <= VR_TRUST_RATIO)
+        return rom_output_part(amplitudes(s), NULL, vr);
     if (rom_in_block(vr, VR_START, N_START))
         return s->memory.start[vr - VR_START];
     if (rom_in_block(vr, VR_START_MISFIT, START_FROM_SENSORS))
         return s->memory.start_misfit;
     switch (vr) {
-    case VR_TRUST_RATIO:
-        return updated_output(s)->trust_ratio;
     case VR_INPUT_GAIN:
         return s->memory.input_gain;
     case VR_TRUST_RADIUS:
@@ -184,6 +192,8 @@ int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value
         return before_start && !START_FROM_SENSORS;
     if (rom_in_block(vr, VR_INPUT, N_INPUT_ALL))
         return 1;
+    if (mode == MODE_WITHIN_STEP)
+        return 0;
     if (rom_in_block(vr, VR_START, N_START))
         return before_start;
     switch (vr) {
@@ -201,9 +211,7 @@ int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value
 
 void rom_set_real(rom_instance *s, fmi2ValueReference vr, double value)
 {
-    s->rate_is_valid = 0;
-    if (vr < VR_RATE)
-        s->output_is_valid = 0; /* what is kept of the outputs depends on no input */
+    s->known &= vr < VR_RATE ? 0U : ~(unsigned)KNOWN_RATE; /* what is kept of the outputs depends on no input */
     if (vr < VR_RATE && vr % 2 == 0)
         s->memory.z[vr / 2].re = value;
     else if (vr < VR_RATE)

@@ -20,6 +20,7 @@ enum {
     MODE_CONTINUOUS = 1 << 4,
     MODE_TERMINATED = 1 << 5,
     MODE_ERROR = 1 << 6,
+    MODE_WITHIN_STEP = 1 << 7, /* the importer is asked for inputs and may do nothing else; never in a saved state */
     MODE_READABLE = MODE_INITIALIZATION | MODE_STEP_COMPLETE | MODE_EVENT | MODE_CONTINUOUS | MODE_TERMINATED | MODE_ERROR,
     MODE_WRITABLE = MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP_COMPLETE | MODE_EVENT | MODE_CONTINUOUS,
     MODE_ANY = MODE_INSTANTIATED | MODE_READABLE
@@ -67,6 +68,15 @@ typedef struct rom_snapshot {
     struct rom_snapshot *next;
 } rom_snapshot;
 
+/* What has been computed for the present memory; each is computed when it is first asked for. */
+enum {
+    KNOWN_RATE = 1 << 0,
+    KNOWN_CHART = 1 << 1,
+    KNOWN_DISPLACEMENT = 1 << 2,
+    KNOWN_VELOCITY = 1 << 3,
+    KNOWN_AMPLITUDE = 1 << 4
+};
+
 /* Lets the importer set the inputs at a time within a step. */
 typedef void (*rom_input_request)(void *importer, double time);
 
@@ -76,7 +86,7 @@ typedef struct {
     rom_workspace workspace;
     rom_complex rate[N_MODE];
     rom_output output;
-    int rate_is_valid, output_is_valid;
+    unsigned known;
     rom_snapshot *snapshots; /* every live handle given out by fmi2GetFMUstate */
     rom_logger logger;
     unsigned initial_categories;
@@ -100,16 +110,16 @@ void rom_invalidate(rom_instance *s);
 
 void rom_update_rate(rom_instance *s);
 
-/* Logs a crossing of the trust radius; fmi2Warning on leaving it, if wanted. */
-fmi2Status rom_check_trust(rom_instance *s);
+/* Logs a crossing of the trust radius by the present ratio; fmi2Warning on leaving it, if wanted. */
+fmi2Status rom_check_trust(rom_instance *s, double ratio);
 
-int rom_beyond_hard_limit(const rom_instance *s, const rom_complex z[]);
+int rom_beyond_hard_limit(const rom_instance *s, double ratio);
 
 /* With START_FROM_SENSORS, puts the state where the sensors best show the start values; does nothing otherwise. */
 void rom_update_start(rom_instance *s);
 
-/* d outputs along dz and, for the absolute ones, along du (all inputs, after the gain), in the order of the outputs. */
-double rom_output_tangent(const rom_output *dout, const double du[], fmi2ValueReference vr);
+/* Real output vr of `out`, values or their change; the absolute ones add that of the base, from all inputs after the gain. */
+double rom_output_part(const rom_output *out, const double u[], fmi2ValueReference vr);
 
 double rom_get_real(rom_instance *s, fmi2ValueReference vr);
 int rom_settable_real(const rom_instance *s, fmi2ValueReference vr, double value);

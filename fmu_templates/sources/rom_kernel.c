@@ -32,17 +32,39 @@ static void pair_with_conjugate(const rom_complex z[], rom_complex zeta[])
     }
 }
 
-static void complex_monomials(const rom_product product[], size_t n_product, rom_complex p[])
+static rom_complex times_real(double s, rom_complex a)
 {
-    for (size_t k = 0; k < n_product; ++k)
-        p[N_REDUCED + k] = multiply(p[product[k].left], p[product[k].right]);
+    rom_complex c = {s * a.re, s * a.im};
+    return c;
 }
 
-static void complex_tangents(const rom_product product[], size_t n_product, const rom_complex p[], rom_complex dp[])
+/* The first N_MODE of p are z */
+static void complex_monomials(const rom_product product[], size_t n_product, const rom_product pair[], size_t n_pair,
+                              rom_complex p[])
 {
+    rom_complex *next = p + N_REDUCED;
+    double square[N_MODE];
+    for (size_t j = 0; j < N_MODE; ++j)
+        square[j] = p[j].re * p[j].re + p[j].im * p[j].im;
+    for (size_t k = 0; k < n_product; ++k)
+        *next++ = multiply(p[product[k].left], p[product[k].right]);
+    for (size_t k = 0; k < n_pair; ++k)
+        *next++ = times_real(square[pair[k].right], p[pair[k].left]);
+}
+
+static void complex_tangents(const rom_product product[], size_t n_product, const rom_product pair[], size_t n_pair,
+                             const rom_complex p[], rom_complex dp[])
+{
+    rom_complex *next = dp + N_REDUCED;
     for (size_t k = 0; k < n_product; ++k) {
         const size_t a = product[k].left, b = product[k].right;
-        dp[N_REDUCED + k] = add(multiply(dp[a], p[b]), multiply(p[a], dp[b]));
+        *next++ = add(multiply(dp[a], p[b]), multiply(p[a], dp[b]));
+    }
+    for (size_t k = 0; k < n_pair; ++k) {
+        const size_t a = pair[k].left, j = pair[k].right;
+        const double square = p[j].re * p[j].re + p[j].im * p[j].im;
+        const double change = 2.0 * (p[j].re * dp[j].re + p[j].im * dp[j].im);
+        *next++ = add(times_real(square, dp[a]), times_real(change, p[a]));
     }
 }
 
@@ -67,43 +89,71 @@ static void add_inputs(const double u[], size_t n_input, rom_complex rate[])
         }
 }
 
-static void real_monomials(const rom_product product[], size_t n_product, double p[])
+static void real_monomials(const rom_run run[], size_t n_run, double p[])
 {
-    for (size_t k = 0; k < n_product; ++k)
-        p[N_REDUCED + k] = p[product[k].left] * p[product[k].right];
-}
-
-static void real_tangents(const rom_product product[], size_t n_product, const double p[], double dp[])
-{
-    for (size_t k = 0; k < n_product; ++k) {
-        const size_t a = product[k].left, b = product[k].right;
-        dp[N_REDUCED + k] = dp[a] * p[b] + p[a] * dp[b];
+    size_t next = N_REDUCED;
+    for (size_t k = 0; k < n_run; ++k) {
+        const size_t n = run[k].count;
+        const double x = p[run[k].factor], *restrict left = p + run[k].left;
+        double *restrict target = p + next; /* behind all that is read */
+        for (size_t i = 0; i < n; ++i)
+            target[i] = left[i] * x;
+        next += n;
     }
 }
 
-/* y/s = Re(T p); conjugate pairs of monomials are folded into one when the coefficients are written */
-static void chart_rows(const rom_tables *t, const rom_complex p[], double y[])
+static void real_tangents(const rom_run run[], size_t n_run, const double p[], double dp[])
 {
-    double sum[N_REDUCED] = {0.0}; /* local: compilers need not fear that y overlaps the tables */
-    for (size_t k = 0; k < N_REDUCED + N_CHART_PRODUCT; ++k)
-        for (size_t l = 0; l < N_REDUCED; ++l)
-            sum[l] += t->chart_re[k][l] * p[k].re - t->chart_im[k][l] * p[k].im;
-    memcpy(y, sum, sizeof sum);
+    double *next = dp + N_REDUCED;
+    for (size_t k = 0; k < n_run; ++k) {
+        const size_t b = run[k].factor, end = run[k].left + (size_t)run[k].count;
+        for (size_t a = run[k].left; a < end; ++a)
+            *next++ = dp[a] * p[b] + p[a] * dp[b];
+    }
 }
 
-static void sensor_rows(const rom_tables *t, const double p[], double x[])
+/* y/s = Re(T p); conjugate pairs of monomials are folded into one when the coefficients are written. Even and odd
+   monomials are summed apart, so that an addition need not wait for the one before it. */
+static void chart_rows(const rom_tables *t, const rom_complex p[], double y[])
 {
-    double sum[N_SENSOR_ROW] = {0.0};
-    for (size_t k = 0; k < N_REDUCED + N_SENSOR_PRODUCT; ++k)
-        for (size_t i = 0; i < N_SENSOR_ROW; ++i)
-            sum[i] += t->sensor[k][i] * p[k];
-    memcpy(x, sum, sizeof sum);
+    double sum[2][N_REDUCED] = {{0.0}};
+    size_t k = N_CHART_MONOMIAL % 2;
+    for (size_t l = 0; k > 0 && l < N_REDUCED; ++l)
+        sum[0][l] = t->chart_re[0][l] * p[0].re - t->chart_im[0][l] * p[0].im;
+    for (; k < N_CHART_MONOMIAL; k += 2)
+        for (size_t e = 0; e < 2; ++e)
+            for (size_t l = 0; l < N_REDUCED; ++l)
+                sum[e][l] += t->chart_re[k + e][l] * p[k + e].re - t->chart_im[k + e][l] * p[k + e].im;
+    for (size_t l = 0; l < N_REDUCED; ++l)
+        y[l] = sum[0][l] + sum[1][l];
+}
+
+/* a . b in four sums, as above; arrays of two, which compilers take for vectors */
+static double dot(const double a[], const double b[], size_t n)
+{
+    double even[2] = {0.0, 0.0}, odd[2] = {0.0, 0.0};
+    size_t k = n % 4;
+    for (size_t e = 0; e < k; ++e)
+        even[0] += a[e] * b[e];
+    for (; k < n; k += 4) {
+        even[0] += a[k] * b[k];
+        even[1] += a[k + 1] * b[k + 1];
+        odd[0] += a[k + 2] * b[k + 2];
+        odd[1] += a[k + 3] * b[k + 3];
+    }
+    return (even[0] + odd[0]) + (even[1] + odd[1]);
+}
+
+static void sensor_rows(const rom_tables *t, const double p[], size_t first, size_t end, double x[])
+{
+    for (size_t i = first; i < end; ++i)
+        x[i] = dot(t->sensor[i], p, N_SENSOR_MONOMIAL);
 }
 
 void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
 {
     pair_with_conjugate(z, w->form);
-    complex_monomials(form_product, N_FORM_PRODUCT, w->form);
+    complex_monomials(form_product, N_FORM_PRODUCT, form_pair, N_FORM_PAIR, w->form);
     normal_form_rows(&w->tables, w->form, rate);
     add_inputs(u, N_INPUT, rate);
 }
@@ -118,23 +168,30 @@ void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_com
 void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
                       rom_complex drate[])
 {
-    pair_with_conjugate(z, w->form);
-    complex_monomials(form_product, N_FORM_PRODUCT, w->form);
+    rom_nonlinear_rate(z, du, w, drate); /* for the monomials */
     pair_with_conjugate(dz, w->form_tangent);
-    complex_tangents(form_product, N_FORM_PRODUCT, w->form, w->form_tangent);
+    complex_tangents(form_product, N_FORM_PRODUCT, form_pair, N_FORM_PAIR, w->form, w->form_tangent);
     normal_form_rows(&w->tables, w->form_tangent, drate);
     add_inputs(du, N_INPUT, drate);
     for (size_t j = 0; j < N_MODE; ++j)
         drate[j] = add(drate[j], multiply(eigenvalue[j], dz[j]));
 }
 
-void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out)
+void rom_chart(const rom_complex z[], rom_workspace *w)
 {
     pair_with_conjugate(z, w->chart);
-    complex_monomials(chart_product, N_CHART_PRODUCT, w->chart);
+    complex_monomials(chart_product, N_CHART_PRODUCT, chart_pair, N_CHART_PAIR, w->chart);
     chart_rows(&w->tables, w->chart, w->sensor);
-    real_monomials(sensor_product, N_SENSOR_PRODUCT, w->sensor);
-    sensor_rows(&w->tables, w->sensor, out->sensor);
+    real_monomials(sensor_run, N_SENSOR_RUN, w->sensor);
+}
+
+void rom_sensors(const rom_workspace *w, size_t first, size_t end, double x[])
+{
+    sensor_rows(&w->tables, w->sensor, first, end, x);
+}
+
+void rom_amplitudes(const rom_complex z[], rom_output *out)
+{
     for (size_t j = 0; j < N_MODE; ++j) {
         out->amplitude[j] = modulus(z[j]);
         out->phase[j] = atan2(z[j].im, z[j].re);
@@ -172,13 +229,12 @@ static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], ro
 void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout)
 {
     memset(dout, 0, sizeof *dout);
-    rom_output out;
-    rom_outputs(z, w, &out);
+    rom_chart(z, w);
     pair_with_conjugate(dz, w->chart_tangent);
-    complex_tangents(chart_product, N_CHART_PRODUCT, w->chart, w->chart_tangent);
+    complex_tangents(chart_product, N_CHART_PRODUCT, chart_pair, N_CHART_PAIR, w->chart, w->chart_tangent);
     chart_rows(&w->tables, w->chart_tangent, w->sensor_tangent);
-    real_tangents(sensor_product, N_SENSOR_PRODUCT, w->sensor, w->sensor_tangent);
-    sensor_rows(&w->tables, w->sensor_tangent, dout->sensor);
+    real_tangents(sensor_run, N_SENSOR_RUN, w->sensor, w->sensor_tangent);
+    sensor_rows(&w->tables, w->sensor_tangent, 0, N_SENSOR_ROW, dout->sensor);
     amplitude_tangents(z, dz, dout);
 }
 

@@ -11,6 +11,9 @@
 #define N_SENSOR_ROW (2 * N_SENSOR)
 #define ROM_AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 
+#define N_FORM_MONOMIAL (N_REDUCED + N_FORM_PRODUCT + N_FORM_PAIR)
+#define N_CHART_MONOMIAL (N_REDUCED + N_CHART_PRODUCT + N_CHART_PAIR)
+
 #define N_BASE_MOTION (ABSOLUTE_OUTPUTS ? 2 : 0) /* displacement and velocity of the base, inputs */
 #define N_ABSOLUTE (ABSOLUTE_OUTPUTS ? N_SENSOR_ROW : 0)
 #define N_START (START_FROM_SENSORS ? N_SENSOR_ROW : 0)
@@ -25,24 +28,30 @@ static inline int rom_is_finite(double x)
     return x - x == 0.0;
 }
 
-/* One monomial as the product of two earlier ones; the first 2 m "monomials" are the variables themselves. */
+/* Complex monomials: the variables, then products of two earlier ones, then earlier ones times |z_right|^2, which is real. */
 typedef struct {
     unsigned short left, right;
 } rom_product;
 
+/* Real monomials: the variables, then runs of `count` that follow each other, each an earlier one, from `left` on and
+   likewise following each other, times the variable `factor`. */
+typedef struct {
+    unsigned short left, factor, count;
+} rom_run;
+
 /* The large tables of coefficients: doubles only, so that a file can hold them as one array. Each instance has its own. */
 typedef struct {
     rom_complex form[ROM_AT_LEAST_ONE(N_FORM_TERM)];
-    double chart_re[N_REDUCED + N_CHART_PRODUCT][N_REDUCED], chart_im[N_REDUCED + N_CHART_PRODUCT][N_REDUCED];
-    double sensor[N_REDUCED + N_SENSOR_PRODUCT][N_SENSOR_ROW];
+    double chart_re[N_CHART_MONOMIAL][N_REDUCED], chart_im[N_CHART_MONOMIAL][N_REDUCED];
+    double sensor[N_SENSOR_ROW][N_SENSOR_MONOMIAL];
 } rom_tables;
 
 /* Tables, and monomials and their tangents; kept with the instance so that no step needs memory or much stack. */
 typedef struct {
     rom_tables tables;
-    rom_complex form[N_REDUCED + N_FORM_PRODUCT], form_tangent[N_REDUCED + N_FORM_PRODUCT];
-    rom_complex chart[N_REDUCED + N_CHART_PRODUCT], chart_tangent[N_REDUCED + N_CHART_PRODUCT];
-    double sensor[N_REDUCED + N_SENSOR_PRODUCT], sensor_tangent[N_REDUCED + N_SENSOR_PRODUCT];
+    rom_complex form[N_FORM_MONOMIAL], form_tangent[N_FORM_MONOMIAL];
+    rom_complex chart[N_CHART_MONOMIAL], chart_tangent[N_CHART_MONOMIAL];
+    double sensor[N_SENSOR_MONOMIAL], sensor_tangent[N_SENSOR_MONOMIAL];
 } rom_workspace;
 
 typedef struct {
@@ -62,7 +71,14 @@ void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_com
 void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
                       rom_complex drate[]);
 
-void rom_outputs(const rom_complex z[], rom_workspace *w, rom_output *out);
+/* y/s = Re(T zeta^E) and its monomials, kept in the workspace */
+void rom_chart(const rom_complex z[], rom_workspace *w);
+
+/* Rows first .. end - 1 of the sensors x: N_SENSOR displacements, then as many velocities; after rom_chart */
+void rom_sensors(const rom_workspace *w, size_t first, size_t end, double x[]);
+
+/* |z_j|, arg z_j and the trust ratio */
+void rom_amplitudes(const rom_complex z[], rom_output *out);
 
 /* d outputs along dz; at z_j = 0, where |z_j| has a kink, its derivative is taken as 0 */
 void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout);

@@ -24,12 +24,13 @@ static void state_of(const double w[], rom_complex z[])
 static void judge(const double target[], rom_workspace *work, candidate *c)
 {
     rom_complex z[N_MODE];
-    rom_output out;
+    double x[ROM_AT_LEAST_ONE(N_SENSOR_ROW)];
     state_of(c->w, z);
-    rom_outputs(z, work, &out);
+    rom_chart(z, work);
+    rom_sensors(work, 0, N_SENSOR_ROW, x);
     c->cost = 0.0;
     for (size_t i = 0; i < N_SENSOR_ROW; ++i) {
-        c->misfit[i] = (out.sensor[i] - target[i]) / rom_sensor_size(i);
+        c->misfit[i] = (x[i] - target[i]) / rom_sensor_size(i);
         c->cost += c->misfit[i] * c->misfit[i];
     }
     for (size_t k = 0; k < N_REDUCED; ++k)

@@ -66,9 +66,9 @@ static void request_inputs(void *importer, double time)
     rom3_instance *i = importer;
     fmi3Boolean early = fmi3False;
     fmi3Float64 early_time = time;
-    i->setting_only = 1;
+    i->updating = 1;
     i->update(i->environment, time, fmi3True, fmi3False, fmi3False, fmi3False, &early, &early_time);
-    i->setting_only = 0;
+    i->updating = 0;
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -109,6 +109,10 @@ void fmi3FreeInstance(fmi3Instance instance)
     rom3_instance *i = instance;
     if (i == NULL)
         return;
+    if (i->updating) {
+        rom3_refuse(i, "fmi3FreeInstance", "the instance is within an intermediate update");
+        return;
+    }
     fmi2FreeInstance(i->s);
     free(i);
 }
@@ -180,13 +184,17 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time, fmi3Float64 step,
     rom3_instance *i = instance;
     if (i == NULL || event_needed == NULL || terminate == NULL || early == NULL || last_time == NULL)
         return rom3_refuse(i, "fmi3DoStep", "the address of a result is NULL");
+    if (i->updating)
+        return rom3_refuse(i, "fmi3DoStep", "the instance is within an intermediate update");
     const fmi2Status status = fmi2DoStep(i->s, time, step, no_set_state_prior ? fmi2True : fmi2False);
     *event_needed = *terminate = *early = fmi3False;
     *last_time = i->s->memory.time;
     if (status <= fmi2Warning && i->update != NULL) {
         fmi3Boolean wish = fmi3False;
         fmi3Float64 wished_time = *last_time;
+        i->updating = 1;
         i->update(i->environment, *last_time, fmi3False, fmi3True, fmi3True, fmi3False, &wish, &wished_time);
+        i->updating = 0;
     }
     return rom3_status(status);
 }

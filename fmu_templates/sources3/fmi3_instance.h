@@ -18,7 +18,7 @@ typedef struct {
     fmi3LogMessageCallback log;
     fmi3IntermediateUpdateCallback update;
     fmi3InstanceEnvironment environment;
-    int setting_only; /* within an intermediate update: inputs may be set, nothing else */
+    int updating; /* within an intermediate update: no step, and the instance must stay */
 } rom3_instance;
 
 /* Number of elements of the Float64 variable vr, 0 if there is none. */

@@ -59,8 +59,8 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], 
 {
     rom3_instance *i = instance;
     size_t done = 0;
-    if (i == NULL || i->setting_only || !rom_permits(i->s, MODE_READABLE, "fmi3GetFloat64"))
-        return rom3_refuse(i, "fmi3GetFloat64", "no value can be read now");
+    if (i == NULL || !rom_permits(i->s, MODE_READABLE, "fmi3GetFloat64"))
+        return fmi3Error;
     for (size_t k = 0; k < n; ++k) {
         const size_t length = vr == NULL ? 0 : (vr[k] == VR3_TIME ? 1 : rom3_block_length(vr[k]));
         if (length == 0 || values == NULL || done + length > n_value)
@@ -77,16 +77,13 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], 
     scalars list;
     if (i == NULL || !expand(vr, n, &list) || list.n != n_value)
         return rom3_refuse(i, "fmi3SetFloat64", bad_reference);
-    for (size_t k = 0; i->setting_only && k < list.n; ++k)
-        if (!rom_in_block(list.vr[k], VR_INPUT, N_INPUT_ALL))
-            return rom3_refuse(i, "fmi3SetFloat64", "only inputs can be set within a step");
     return rom3_status(fmi2SetReal(i->s, list.vr, list.n, values));
 }
 
 fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3Boolean values[], size_t n_value)
 {
     rom3_instance *i = instance;
-    if (i == NULL || i->setting_only || n != n_value || (n > 0 && (vr == NULL || values == NULL)))
+    if (i == NULL || n != n_value || (n > 0 && (vr == NULL || values == NULL)))
         return rom3_refuse(i, "fmi3GetBoolean", bad_reference);
     for (size_t k = 0; k < n; ++k) {
         const fmi2ValueReference old = vr[k] >= VR3_BOOLEAN ? vr[k] - VR3_BOOLEAN : VR_BOOLEAN_END;
@@ -102,7 +99,7 @@ fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference vr[], 
 fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, const fmi3Boolean values[], size_t n_value)
 {
     rom3_instance *i = instance;
-    if (i == NULL || i->setting_only || n != n_value || (n > 0 && (vr == NULL || values == NULL)))
+    if (i == NULL || n != n_value || (n > 0 && (vr == NULL || values == NULL)))
         return rom3_refuse(i, "fmi3SetBoolean", bad_reference);
     for (size_t k = 0; k < n; ++k) {
         const fmi2ValueReference old = vr[k] >= VR3_BOOLEAN ? vr[k] - VR3_BOOLEAN : VR_BOOLEAN_END;

@@ -10,7 +10,7 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
-from romgen.errors import RomgenError
+from romgen.errors import RomgenError, system_error
 
 INTERRUPTED = 130
 NOTE_INTERRUPTED = "interrupted; what was finished is kept, the same command continues"
@@ -20,21 +20,29 @@ Result = TypeVar("Result")
 
 
 def reported(command: Callable[P, Result]) -> Callable[P, Result]:
-    """Wrap a command: a RomgenError becomes its message and exit code, Ctrl-C a note and 130."""
+    """Wrap a command: a RomgenError or what the system refuses is one line and an exit code, Ctrl-C a note and 130."""
 
     @functools.wraps(command)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Result:
         try:
             return command(*args, **kwargs)
         except RomgenError as error:
-            lines = str(error).splitlines()
-            if kwargs.get("json_output"):
-                print(json.dumps({"exit_code": error.exit_code, "problems": lines}))
-            raise failure(lines, error.exit_code) from error
+            raise _told(error, as_json=bool(kwargs.get("json_output"))) from error
+        except BrokenPipeError:
+            raise  # whoever read the output has gone; click ends quietly
+        except OSError as error:
+            raise _told(system_error(error), as_json=bool(kwargs.get("json_output"))) from error
         except KeyboardInterrupt:
             raise failure([NOTE_INTERRUPTED], INTERRUPTED) from None
 
     return wrapper
+
+
+def _told(error: RomgenError, *, as_json: bool) -> typer.Exit:
+    lines = str(error).splitlines()
+    if as_json:
+        print(json.dumps({"exit_code": error.exit_code, "problems": lines}))
+    return failure(lines, error.exit_code)
 
 
 def failure(lines: Sequence[str], exit_code: int) -> typer.Exit:

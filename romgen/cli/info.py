@@ -29,7 +29,10 @@ def info(
     """Show what a file of romgen holds."""
     out = Output(quiet=quiet, as_json=json_output)
     if file.is_dir():
-        file = file / ("result.h5" if (file / "result.h5").is_file() else "study.toml")
+        inside = [file / name for name in ("result.h5", "study.toml") if (file / name).is_file()]
+        if not inside:
+            raise InputError("no run folder and no study", where=str(file), advice="it has no result.h5 or study.toml")
+        file = inside[0]
     if not file.is_file():
         raise InputError("no such file", where=str(file))
     show = {".toml": _study, ".h5": _result, ".json": _summary, ".fmu": _unit}.get(file.suffix.lower())

@@ -22,6 +22,8 @@ def bring_up_to_date(study: Study, folder: Path, out: Output, *, until: str | No
     out.text(f"{study.name} in {folder}")
     with out.progress() as progress:
         result = run_pipeline(study, folder, until=until, force=force, progress=progress)
+    for message in result.messages:
+        out.text(f"  warning: {message}")
     for name in result.computed:
         for message in result.infos[name].messages:
             out.text(f"  {name}: {message}")

@@ -11,7 +11,7 @@ from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
-from romgen.fmu.programme import MonomialProgramme, fold_conjugates, monomial_programme
+from romgen.fmu.programme import MonomialProgramme, complex_programme, fold_conjugates
 from romgen.fmu.records import PLAIN, InterfaceOptions
 from romgen.fmu.tables import sensor_programme, table_hash
 from romgen.reduced_model import ReducedModel
@@ -25,8 +25,7 @@ MAX_PRODUCTS = 60000
 
 def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) -> str:
     """The text of coefficients.h: small constant data only, decimal numbers that read back exactly."""
-    form_programme = monomial_programme(model.normal_form.exponents)
-    chart_programme = monomial_programme(fold_conjugates(model.chart).exponents)
+    form, chart, sensor = _programmes(model)
     return "\n".join(
         [
             f"/* Coefficients of the reduced model {model.name}; generated, data only. */",
@@ -39,10 +38,10 @@ def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) 
             _array("double trained_amplitude[N_MODE]", map(_real, model.trained_amplitude)),
             _array("double trained_facet[N_FACET][N_MODE]", map(_real_row, model.trained_range.facets)),
             _array("rom_complex input_matrix[ROM_AT_LEAST_ONE(N_INPUT)][N_MODE]", _input_rows(model.input_matrix)),
-            _products("form", form_programme),
-            _normal_form(model, form_programme),
-            _products("chart", chart_programme),
-            _products("sensor", sensor_programme(model)),
+            _products("form", form),
+            _normal_form(model, form),
+            _products("chart", chart),
+            _runs("sensor", sensor),
             _array("double base_share[N_SENSOR]", map(_real, options.base_share or (0.0,) * len(model.sensors))),
             _array("double sensor_size[2]", map(_real, _sensor_sizes(model))),
             "#endif",
@@ -61,8 +60,7 @@ def tables_header(table: bytes) -> str:
 def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], options: InterfaceOptions = PLAIN) -> str:
     """The text of model_sizes.h: identity and sizes of the model; ``data`` is coefficients.h and the large tables."""
     content_hash = hashlib.sha256(data[0].encode() + data[1]).hexdigest()
-    form = monomial_programme(model.normal_form.exponents)
-    chart = monomial_programme(fold_conjugates(model.chart).exponents)
+    form, chart, sensor = _programmes(model)
     sizes = {
         "N_MODE": len(model.eigenvalues),
         "N_FACET": len(model.trained_range.facets),
@@ -71,9 +69,12 @@ def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], option
         "ABSOLUTE_OUTPUTS": int(options.base_share is not None),
         "START_FROM_SENSORS": int(options.start_from_sensors),
         "N_FORM_PRODUCT": len(form.products),
+        "N_FORM_PAIR": len(form.pairs),
         "N_FORM_TERM": int(np.count_nonzero(model.normal_form.coefficients)),
         "N_CHART_PRODUCT": len(chart.products),
-        "N_SENSOR_PRODUCT": len(sensor_programme(model).products),
+        "N_CHART_PAIR": len(chart.pairs),
+        "N_SENSOR_MONOMIAL": sensor.n_monomial,
+        "N_SENSOR_RUN": len(sensor.runs),
         "DEFAULT_HARD_LIMIT": _real(HARD_LIMIT),
         "DEFAULT_MAX_INTERNAL_STEP": _real(largest_step(model.eigenvalues)),
         "MODEL_IDENTIFIER": model.name,
@@ -108,17 +109,42 @@ def _normal_form(model: ReducedModel, programme: MonomialProgramme) -> str:
     )
 
 
+def _programmes(model: ReducedModel) -> tuple[MonomialProgramme, MonomialProgramme, MonomialProgramme]:
+    """The monomials of normal form, chart and sensors.
+
+    Raises
+    ------
+    InputError : more of them than the runtime can number.
+    """
+    form = complex_programme(model.normal_form.exponents)
+    chart = complex_programme(fold_conjugates(model.chart).exponents)
+    sensor = sensor_programme(model)
+    for name, programme in (("form", form), ("chart", chart), ("sensor", sensor)):
+        if programme.n_monomial > MAX_PRODUCTS:
+            raise InputError(
+                f"the {name} map has too many monomials",
+                where="FMU export",
+                value=programme.n_monomial,
+                advice="lower the order",
+            )
+    return form, chart, sensor
+
+
 def _products(name: str, programme: MonomialProgramme) -> str:
-    if programme.n_monomial > MAX_PRODUCTS:
-        raise InputError(
-            f"the {name} map has too many monomials",
-            where="FMU export",
-            value=programme.n_monomial,
-            advice="lower the order",
-        )
-    size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_PRODUCT)"
-    pairs = [f"{{{left}, {right}}}" for left, right in programme.products] or ["{0, 0}"]
-    return _array(f"rom_product {name}_product[{size}]", pairs)
+    """Products and pairs of complex monomials."""
+    arrays = []
+    for kind, rows in (("product", programme.products), ("pair", programme.pairs)):
+        items = [f"{{{left}, {right}}}" for left, right in rows] or ["{0, 0}"]
+        size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_{kind.upper()})"
+        arrays.append(_array(f"rom_product {name}_{kind}[{size}]", items))
+    return "\n".join(arrays)
+
+
+def _runs(name: str, programme: MonomialProgramme) -> str:
+    """Products of real monomials, those that follow each other as one run."""
+    size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_RUN)"
+    runs = [f"{{{left}, {factor}, {count}}}" for left, factor, count in programme.runs] or ["{0, 0, 0}"]
+    return _array(f"rom_run {name}_run[{size}]", runs)
 
 
 def _array(declaration: str, items: Iterable[str]) -> str:

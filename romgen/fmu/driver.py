@@ -57,8 +57,16 @@ def fmpy_problems(path: Path | str) -> tuple[str, ...]:
 
 @contextmanager
 def unpacked(path: Path | str) -> Iterator[str]:
-    """The archive as a temporary folder."""
-    folder = extract(str(path))
+    """The archive as a temporary folder.
+
+    Raises
+    ------
+    InputError : a file of the archive is damaged.
+    """
+    try:
+        folder = extract(str(path))
+    except Exception as error:  # zipfile and zlib raise their own, fmpy plain Exception
+        raise InputError(f"cannot be unpacked ({error})", where=str(path)) from error
     try:
         yield folder
     finally:

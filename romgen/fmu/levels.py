@@ -10,9 +10,11 @@ import numpy as np
 from fmpy import read_model_description, simulate_fmu
 
 from romgen.arrays import FloatArray
-from romgen.fmu.binary_checks import binary_rows, host_binaries
+from romgen.errors import InputError
+from romgen.fmu.binary_checks import binary_rows, host_library, load_problem
 from romgen.fmu.check import random_input, replay_difference
 from romgen.fmu.driver import Hold, fmpy_problems, replay, unpacked
+from romgen.fmu.driver3 import float_lengths
 from romgen.fmu.kernel_checks import START, kernel_rows
 from romgen.fmu.model_exchange import replay_model_exchange
 from romgen.fmu.model_file import model_in_unit
@@ -25,6 +27,10 @@ from romgen.progress import Report
 from romgen.reduced_model import ReducedModel
 from romgen.simulate import simulate_reference
 
+NOT_MEASURED = (
+    "L1 to L3 need a native unit of romgen that starts from states, with a default step and a working binary for "
+    "this machine"
+)
 NOT_HERE = "valgrind, sanitizers and random call sequences run in the tests of romgen, not in this table"
 
 
@@ -57,16 +63,37 @@ def validate_unit(path: Path, report: Report = _silent) -> FmuLevels:
     found, notes = (*problems, *broken), [NOT_HERE]
     model = model_in_unit(path)
     with unpacked(path) as folder:
-        has_binary = host_binaries(Path(folder), version).is_dir()
-        if model is not None and has_binary and _is_native(path):
-            rows += binary_rows(Path(folder), version)
+        library = host_library(Path(folder), version)
+        damage = None if library is None else load_problem(library)
+        if damage is not None:
+            rows.append(LevelRow("L0", "libraries for this machine that cannot be loaded", 1.0, 0.0, 0.0))
+            found = (*found, damage)
+        if model is not None and library is not None and damage is None and _is_native(path):
+            _check_same_model(path, model)
+            rows += binary_rows(library, version)
             rows += _measured(path, model, report)
         else:
-            notes.insert(
-                0, "L1 to L3 need a native unit of romgen that starts from states, with a binary for this machine"
-            )
+            notes.insert(0, NOT_MEASURED)
     report(1.0, "checked")
     return FmuLevels(tuple(rows), found, tuple(notes))
+
+
+def _check_same_model(path: Path, model: ReducedModel) -> None:
+    """Whether the description and rom.json speak of the same states and inputs.
+
+    Raises
+    ------
+    InputError : they do not.
+    """
+    lengths = float_lengths(_variables(path))  # of arrays, in FMI 3.0
+    states = sum(lengths.get(v.valueReference, 1) for v in _variables(path) if v.derivative is not None)
+    described, held = (states, len(_inputs(path))), (2 * len(model.eigenvalues), len(model.inputs))
+    if described != held:
+        raise InputError(
+            "rom.json belongs to another unit",
+            where=str(path),
+            value=f"{held[0]} states and {held[1]} inputs, modelDescription.xml has {described[0]} and {described[1]}",
+        )
 
 
 def _measured(path: Path, model: ReducedModel, report: Report) -> Iterator[LevelRow]:
@@ -80,11 +107,14 @@ def _measured(path: Path, model: ReducedModel, report: Report) -> Iterator[Level
 
 
 def _is_native(path: Path) -> bool:
-    """Both interfaces, and start values of the states."""
+    """Both interfaces, start values of the states, and a step to take."""
     description = read_model_description(str(path), validate=False)
+    if description.defaultExperiment is None or description.defaultExperiment.stepSize is None:
+        return False
     states = [v.derivative for v in description.modelVariables if v.derivative is not None]
     both = description.coSimulation is not None and description.modelExchange is not None
-    return both and all(state.initial == "exact" for state in states)
+    named = {v.name for v in description.modelVariables} >= {"trust_ratio", "max_internal_step"}
+    return both and named and all(state.initial == "exact" for state in states)
 
 
 def _input_rows(path: Path, model: ReducedModel, step: float) -> Iterator[LevelRow]:

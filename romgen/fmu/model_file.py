@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
 from romgen.fmu.programme import fold_conjugates
-from romgen.fmu.tables import TABLE_FILE, table_bytes, with_table
+from romgen.fmu.tables import TABLE_FILE, TABLE_LAYOUT, table_bytes, with_table
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
 from romgen.stability import Stability
@@ -36,12 +37,16 @@ def model_in_unit(path: Path) -> ReducedModel | None:
     ------
     InputError : its files are no reduced model.
     """
-    with zipfile.ZipFile(path) as archive:
-        names = archive.namelist()
-        if JSON_PATH not in names:
-            return None
-        table = archive.read(TABLE_PATH) if TABLE_PATH in names else None
-        return model_from_json(archive.read(JSON_PATH).decode(), table)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            if JSON_PATH not in names:
+                return None
+            table = archive.read(TABLE_PATH) if TABLE_PATH in names else None
+            text = archive.read(JSON_PATH).decode()
+    except (zipfile.BadZipFile, zlib.error, UnicodeDecodeError) as error:
+        raise InputError(f"is damaged ({error})", where=f"{path}: {JSON_PATH}") from error
+    return model_from_json(text, table, where=f"{path}: {JSON_PATH}")
 
 
 def model_json(model: ReducedModel) -> str:
@@ -81,7 +86,7 @@ def _text(content: dict[str, object]) -> str:
 
 def _map(p: PolynomialMap[np.float64] | PolynomialMap[np.complex128], table: str | None = None) -> dict[str, object]:
     if table is not None:
-        return {"exponents": p.exponents.tolist(), "coefficients": table}
+        return {"exponents": p.exponents.tolist(), "coefficients": table, "layout": TABLE_LAYOUT}
     is_complex = np.iscomplexobj(p.coefficients)
     return {
         "exponents": p.exponents.tolist(),
@@ -93,13 +98,14 @@ def _pairs(values: ComplexArray | FloatArray) -> object:
     return np.stack([values.real, values.imag], axis=-1).tolist()
 
 
-def model_from_json(text: str, table: bytes | None = None) -> ReducedModel:
+def model_from_json(text: str, table: bytes | None = None, where: str = "rom.json") -> ReducedModel:
     """The model that ``model_json`` wrote, exactly; the chart comes folded, which leaves its real part as it was.
 
     Parameters
     ----------
     text : content of rom.json.
     table : content of coefficients.bin, for a unit that has one.
+    where : named in errors.
 
     Raises
     ------
@@ -109,6 +115,10 @@ def model_from_json(text: str, table: bytes | None = None) -> ReducedModel:
         content = json.loads(text)
         if content["format"] != FORMAT:
             raise ValueError(f"format is '{content['format']}'")
+        if table is not None and content["chart"].get("layout") != TABLE_LAYOUT:
+            raise ValueError(f"{TABLE_FILE} was written by another version of romgen; export the unit again")
+        if table is None and content["chart"]["coefficients"] == TABLE_FILE:
+            raise ValueError(f"{TABLE_FILE} with its coefficients is missing")
         if table is None:
             return _model(content)
         for key, zero in (("chart", [0.0, 0.0]), ("displacement_m", 0.0), ("velocity_m_per_s", 0.0)):
@@ -116,7 +126,7 @@ def model_from_json(text: str, table: bytes | None = None) -> ReducedModel:
             content[key]["coefficients"] = [[zero] * len(content[key]["exponents"])] * n_out
         return with_table(_model(content), table)
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(f"is not a reduced model ({error})", where="rom.json") from error
+        raise InputError(f"is not a reduced model ({error})", where=where) from error
 
 
 def _model(content: dict[str, Any]) -> ReducedModel:

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from romgen.errors import InputError
 from romgen.fmu.rules3 import RULES3, archive_problems3
+from romgen.fmu.rules_of_both import applied, binary_rules, identity_rules
 from romgen.fmu.rules_structure import structure_rules
-from romgen.fmu.rules_types import alias_rules, initial_of, limits, repeated, type_rules, value_of
+from romgen.fmu.rules_types import UNTYPED, alias_rules, initial_of, limits, repeated, type_rules, value_of
 
 LEGAL: dict[tuple[str, str], set[str | None]] = {
     ("parameter", "fixed"): {"exact"},
@@ -69,33 +70,23 @@ def rule_problems(path: Path | str) -> tuple[str, ...]:
 
 def description_problems3(root: Element) -> tuple[str, ...]:
     """The rules of FMI 3.0 that concern modelDescription.xml alone."""
-    return tuple(problem for rule in (*RULES3, _experiment, _units) for problem in rule(root))
+    return applied((*RULES3, _experiment, _units), root)
 
 
 def description_problems(root: Element) -> tuple[str, ...]:
     """The rules of FMI 2.0 that concern modelDescription.xml alone."""
-    rules: tuple[Callable[[Element], Iterator[str]], ...] = (
+    rules = (
         _head, _experiment, _units, type_rules, _names, _kinds, _values, _special, alias_rules, structure_rules,
     )  # fmt: skip
-    return tuple(problem for rule in rules for problem in rule(root))
+    return applied(rules, root)
 
 
 def archive_problems(root: Element, names: list[str]) -> tuple[str, ...]:
     """The rules that concern the files beside it."""
-    problems = [f"the path '{name}' holds a backslash" for name in names if "\\" in name]
     identifiers = {e.get("modelIdentifier") for e in root if e.tag in {"ModelExchange", "CoSimulation"}}
-    for name in names:
-        parts = name.split("/")
-        if parts[0] == "binaries" and len(parts) > 2 and parts[2]:
-            if not PLATFORMS.fullmatch(parts[1]):
-                problems.append(f"'{parts[1]}' is no platform of binaries/")
-            if Path(name).suffix in {".so", ".dll", ".dylib"} and Path(name).stem not in identifiers:
-                problems.append(f"the library '{name}' is not named after the model identifier")
     missing = [file.get("name") for file in root.iter("File") if f"sources/{file.get('name')}" not in names]
-    problems.extend(f"the source file '{name}' is missing" for name in missing)
-    if not any(name.startswith(("binaries/", "sources/")) and not name.endswith("/") for name in names):
-        problems.append("there is neither a binary nor a source file")
-    return tuple(problems)
+    problems = [f"the source file '{name}' is missing" for name in missing]
+    return (*binary_rules(names, identifiers, PLATFORMS), *problems)
 
 
 def _head(root: Element) -> Iterator[str]:
@@ -106,14 +97,7 @@ def _head(root: Element) -> Iterator[str]:
     interfaces = [e for e in root if e.tag in {"ModelExchange", "CoSimulation"}]
     if not interfaces:
         yield "neither ModelExchange nor CoSimulation is offered"
-    for e in interfaces:
-        if not re.fullmatch(r"[A-Za-z_]\w*", e.get("modelIdentifier", ""), re.ASCII):
-            yield f"{e.tag}: the model identifier '{e.get('modelIdentifier')}' is no C name"
-    date = root.get("generationDateAndTime")
-    if date is not None and not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z", date):
-        yield f"generationDateAndTime '{date}' is not YYYY-MM-DDThh:mm:ssZ"
-    categories = [e.get("name") for e in root.iter("Category")]
-    yield from (f"the log category '{name}' occurs twice" for name in sorted(repeated(categories)))
+    yield from identity_rules(root, interfaces)
     tools = [tool.get("name") for tool in root.iterfind("VendorAnnotations/Tool")]
     yield from (f"two annotations of the tool '{name}'" for name in sorted(repeated(tools)))
     for e in interfaces:
@@ -161,6 +145,7 @@ def _names(root: Element) -> Iterator[str]:
 
 def _kinds(root: Element) -> Iterator[str]:
     variables = list(root.iter("ScalarVariable"))
+    yield from (f"'{v.get('name')}': the variable has no type" for v in variables if value_of(v).tag == UNTYPED)
     if sum(v.get("causality") == "independent" for v in variables) > 1:
         yield "more than one variable is independent"
     for v in variables:

@@ -6,10 +6,10 @@ Written after FMI 3.0, section 2.4; each message names the variable or element a
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+from romgen.fmu.rules_of_both import Rule, binary_rules, identity_rules
 from romgen.fmu.rules_types import limits, repeated
 
 FLOATS = {"Float32", "Float64"}
@@ -42,14 +42,7 @@ def head_rules(root: Element) -> Iterator[str]:
     interfaces = [e for e in root if e.tag in INTERFACES]
     if not interfaces:
         yield "no interface is offered"
-    for e in interfaces:
-        if not re.fullmatch(r"[A-Za-z_]\w*", e.get("modelIdentifier", ""), re.ASCII):
-            yield f"{e.tag}: the model identifier '{e.get('modelIdentifier')}' is no C name"
-    date = root.get("generationDateAndTime")
-    if date is not None and not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z", date):
-        yield f"generationDateAndTime '{date}' is not YYYY-MM-DDThh:mm:ssZ"
-    categories = [e.get("name") for e in root.iter("Category")]
-    yield from (f"the log category '{name}' occurs twice" for name in sorted(repeated(categories)))
+    yield from identity_rules(root, interfaces)
 
 
 def type_rules(root: Element) -> Iterator[str]:
@@ -175,27 +168,17 @@ def _dependencies(entry: Element, known: set[str], kinds: set[str]) -> Iterator[
 
 def archive_problems3(root: Element, names: list[str], build: Element | None) -> tuple[str, ...]:
     """The rules that concern the files beside the description; ``build`` is buildDescription.xml."""
-    problems = [f"the path '{name}' holds a backslash" for name in names if "\\" in name]
-    identifiers = {e.get("modelIdentifier") for e in root if e.tag in INTERFACES}
-    for name in names:
-        parts = name.split("/")
-        if parts[0] == "binaries" and len(parts) > 2 and parts[2]:
-            if not PLATFORM.fullmatch(parts[1]):
-                problems.append(f"'{parts[1]}' is no platform of binaries/")
-            if Path(name).suffix in {".so", ".dll", ".dylib"} and Path(name).stem not in identifiers:
-                problems.append(f"the library '{name}' is not named after the model identifier")
+    problems = list(binary_rules(names, {e.get("modelIdentifier") for e in root if e.tag in INTERFACES}, PLATFORM))
     if build is None and any(name.startswith("sources/") for name in names):
         problems.append("sources/ has no buildDescription.xml")
     for configuration in build.iter("BuildConfiguration") if build is not None else ():
         files = [file.get("name") for file in configuration.iter("SourceFile")]
         problems.extend(f"the source file '{file}' is missing" for file in files if f"sources/{file}" not in names)
         problems.extend(f"the source file '{file}' is listed twice" for file in sorted(repeated(files)))
-    if not any(name.startswith(("binaries/", "sources/")) and not name.endswith("/") for name in names):
-        problems.append("there is neither a binary nor a source file")
     return tuple(problems)
 
 
-RULES3: tuple[Callable[[Element], Iterator[str]], ...] = (head_rules, type_rules, variable_rules, structure_rules)
+RULES3: tuple[Rule, ...] = (head_rules, type_rules, variable_rules, structure_rules)
 
 
 def _variables(root: Element) -> list[Element]:

@@ -11,13 +11,14 @@ DEFAULT_INITIAL = {
     "output": "calculated",
     "local": "calculated",
 }
+UNTYPED = "none"
 INT32 = (-(2.0**31), 2.0**31 - 1.0)
 
 
 def type_rules(root: Element) -> Iterator[str]:
     """TypeDefinitions, and what variables take from them."""
     simple = list(root.iterfind("TypeDefinitions/SimpleType"))
-    types = {t.get("name"): t[0] for t in simple}
+    types = {t.get("name"): next(iter(t), Element(UNTYPED)) for t in simple}
     names = [t.get("name") for t in simple]
     variables = {v.get("name") for v in root.iter("ScalarVariable")}
     yield from (f"the type '{name}' is declared twice" for name in sorted(repeated(names)))
@@ -115,8 +116,9 @@ def initial_of(v: Element) -> str | None:
 
 
 def value_of(v: Element) -> Element:
-    """The element Real, Integer, ... of a variable."""
-    return next(e for e in v if e.tag in {"Real", "Integer", "Boolean", "String", "Enumeration"})
+    """The element Real, Integer, ... of a variable; an empty one with the tag UNTYPED where there is none."""
+    kinds = (e for e in v if e.tag in {"Real", "Integer", "Boolean", "String", "Enumeration"})
+    return next(kinds, Element(UNTYPED))
 
 
 def limits(value: Element) -> tuple[float, float]:

@@ -46,7 +46,7 @@ def forced_points_figure(points: tuple[ForcedPoint, ...]) -> FigureBlock:
     """Last periods of every point in both models."""
     columns = 2 if len(points) > 1 else 1
     count = -(-len(points) // columns)
-    figure = new_figure(1.9 * count + 0.3)
+    figure = new_figure(1.9 * count + 0.5)
     grid = figure.subplots(count, columns, squeeze=False).ravel()
     for axes, point in zip(grid, points, strict=False):
         shown = point.t >= point.t[-1] - _SHOWN_PERIODS / point.frequency_hz
@@ -56,7 +56,7 @@ def forced_points_figure(points: tuple[ForcedPoint, ...]) -> FigureBlock:
         label(axes, "time [s]", f"{point.sensor} [mm]", title)
     for axes in grid[len(points) :]:
         axes.set_axis_off()
-    grid[0].legend(loc="upper right")
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     tables = tuple(
         curve_table(
             f"forced_point_{number}",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from romgen.load_histories import HistoryComparison
 from romgen.report.blocks import FigureBlock, TableBlock
 from romgen.report.curve_table import curve_table
-from romgen.report.style import BLACK, VERMILLION, label, new_figure, unit_text
+from romgen.report.style import BLACK, VERMILLION, label, legend_above, new_figure, unit_text
 
 
 def history_table(histories: tuple[HistoryComparison, ...]) -> TableBlock:
@@ -37,7 +37,7 @@ def history_figure(histories: tuple[HistoryComparison, ...]) -> FigureBlock:
         axes.plot(item.t, 1e3 * item.fe[:, 0], color=BLACK, label="finite elements")
         axes.plot(item.t, 1e3 * item.rom[:, 0], "--", color=VERMILLION, label="reduced model")
         label(axes, "time [s]", f"{item.sensors[0]} [mm]", item.name)
-    grid[0].legend(loc="upper right")
+    legend_above(grid[0])
     tables = tuple(
         curve_table(
             f"load_history_{item.name}",

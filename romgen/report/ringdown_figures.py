@@ -9,7 +9,7 @@ from romgen.arrays import FloatArray
 from romgen.report.blocks import FigureBlock, TableBlock
 from romgen.report.curve_table import CurveTable, curve_table
 from romgen.report.inputs import Reconstruction
-from romgen.report.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, VERMILLION, label, new_figure
+from romgen.report.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, VERMILLION, label, legend_above, new_figure
 from romgen.structure import RingDown
 
 _ZOOM_CYCLES = 10
@@ -34,7 +34,7 @@ def _draw_error(axes: Axes, pair: Reconstruction) -> None:
     error = 100.0 * (pair.displacement - pair.trajectory.displacement) / np.where(peak > 0.0, peak, 1.0)
     for k, name in enumerate(pair.trajectory.sensors):
         axes.plot(pair.trajectory.t, error[:, k], color=CYCLE[k % len(CYCLE)], linewidth=0.7, label=name)
-    axes.legend(loc="upper right", ncols=4)
+    legend_above(axes)
     label(axes, "time [s]", "error / peak [%]", "error of every sensor")
 
 
@@ -47,7 +47,7 @@ def ringdown_figure(pair: Reconstruction) -> FigureBlock:
     k, t = pair.main_sensor, pair.trajectory.t
     sensor = pair.trajectory.sensors[k]
     _draw_both(places["all"], pair, slice(None))
-    places["all"].legend(loc="upper right", ncols=2)
+    legend_above(places["all"])
     label(places["all"], "time [s]", f"{sensor} [mm]", f"{pair.trajectory.name} ({pair.role})")
     _draw_error(places["error"], pair)
     zoom = _ZOOM_CYCLES * cycle_s(t, pair.trajectory.displacement[:, k])
@@ -110,7 +110,7 @@ def energy_figure(ring_down: RingDown) -> FigureBlock:
     )
     _draw_stack(top, t, parts)
     top.plot(t, 1e3 * budget, color=BLACK, linewidth=1.0, linestyle="--", label="initial + external work")
-    top.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, columnspacing=1.2, handlelength=1.4)
+    legend_above(top)
     label(top, "", "energy [mJ]", name)
     percent = 100.0 * ledger.imbalance / np.abs(budget).max()
     bottom.plot(t, percent, color=VERMILLION, linewidth=0.9)

@@ -70,6 +70,12 @@ def new_figure(height_in: float, width_in: float = FULL_WIDTH_IN) -> Figure:
     return figure
 
 
+def legend_above(axes: Axes) -> None:
+    """The legend beside the title, above the frame, where it lies on no curve; at most six names in a row."""
+    count = len(axes.get_legend_handles_labels()[1])
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=min(count, 6), columnspacing=1.2, handlelength=1.4)
+
+
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:
     """Name both axes, units included (``"time [s]"``), and the panel."""
     axes.set_xlabel(x)

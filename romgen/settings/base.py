@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
 from romgen.settings.quantities import in_unit
 
@@ -13,6 +13,19 @@ class Settings(BaseModel):
     """Base of all tables: frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, value: object, info: ValidationInfo) -> object:
+        """Python takes true for 1; a study that says so has a mistake."""
+        field = cls.model_fields[info.field_name or ""]
+        if field.annotation is not bool and _holds_truth(value):
+            raise ValueError("true and false are no numbers")
+        return value
+
+
+def _holds_truth(value: object) -> bool:
+    return isinstance(value, bool) or (isinstance(value, list | tuple) and any(map(_holds_truth, value)))
 
 
 Length = Annotated[float, BeforeValidator(in_unit("m"))]

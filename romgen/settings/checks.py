@@ -250,6 +250,11 @@ def _downstream_problems(study: Study) -> Iterator[str]:
         yield f"[forced_response] levels need a load input, which data do not have; add [forcing.{forced.input}]"
     elif forced.levels and forced.input not in study.load_inputs:
         yield unknown("[forced_response] input:", "load input", forced.input, study.load_inputs)
+    if any(level == 0.0 for level in forced.levels):
+        yield f"[forced_response] levels must not be 0; got {list(forced.levels)}"
+    low, high = forced.frequency_range_hz or (0.0, 1.0)
+    if not low < high:
+        yield f"[forced_response] frequency_range_hz must rise; got [{low:g}, {high:g}]"
     if study.forced_validation is not None and (study.data is not None or not forced.levels):
         yield "[forced_validation] needs a finite-element model and [forced_response] levels; remove the table"
     for name, history in study.load_histories.items():

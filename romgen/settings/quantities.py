@@ -20,6 +20,9 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Accepted units of each SI unit and their factor to it."""
 
+MICRO = str.maketrans("\N{MICRO SIGN}\N{GREEK SMALL LETTER MU}", "uu")
+"""Both characters that keyboards and programs write for micro, as the u that ``UNITS`` has."""
+
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
 
 
@@ -36,10 +39,20 @@ def parse_quantity(value: object, unit: str) -> object:
     if match is None:
         raise ValueError(f"not a number with a unit, such as 1.5 or '1.5 {unit}'")
     number, symbol = match.groups()
-    known = UNITS[unit]
-    if symbol not in known:
+    return float(number) * unit_factor(symbol, unit)
+
+
+def unit_factor(symbol: str, unit: str) -> float:
+    """Return the factor of a unit such as "mm" to the SI ``unit``; every character for micro is taken (``MICRO``).
+
+    Raises
+    ------
+    ValueError : it is not one of ``UNITS[unit]``.
+    """
+    known, plain = UNITS[unit], symbol.translate(MICRO)
+    if plain not in known:
         raise ValueError(f"unknown unit '{symbol}', accepted are {', '.join(u for u in known if u)}")
-    return float(number) * known[symbol]
+    return known[plain]
 
 
 def in_unit(unit: str) -> Callable[[object], object]:

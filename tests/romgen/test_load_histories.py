@@ -42,9 +42,18 @@ def test_samples_are_linear_between_and_zero_outside(tmp_path: Path) -> None:
         np.testing.assert_allclose(samples.at(np.array([-1.0, 0.5, 1.0, 1.5, 3.0])), [0.0, 5e-3, 1e-2, 5e-3, 0.0])
 
 
+def test_csv_of_spreadsheets_keeps_its_first_sample(tmp_path: Path) -> None:
+    """A byte order mark before the first number, decimal commas."""
+    path = tmp_path / "pulse.csv"
+    path.write_text("0,0;1,5\n1,0;0,5\n", encoding="utf-8-sig")
+    samples = load_samples("pulse", LoadHistorySettings(input="x", file=path))
+    np.testing.assert_array_equal(samples.at(np.array([0.0, 0.5, 1.0])), [1.5, 1.0, 0.5])
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
+        ("0,5,1,5\n1,0\n2,0\n", "line 1 of .* is no sample"),
         ("0,0\n1,x\n", "line 2 of .* is no sample"),
         ("0,0\n0,1\n", "not a load history"),
         ("0,0\n", "not a load history"),

@@ -97,7 +97,9 @@ def test_killed_march_continues(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 def data_context(folder: Path, **data: object) -> Context:
     t = np.linspace(0.0, 1.0, 11)
-    motions = [Trajectory(name, t, ("p", "q"), np.outer(np.cos(t), [1.0, k + 1.0])) for k, name in enumerate("abc")]
+    motions = [
+        Trajectory(name, t, ("p", "q"), np.outer(np.cos(3.0 * t), [1.0, k + 1.0])) for k, name in enumerate("abc")
+    ]
     write_trajectories(folder / "motions.h5", motions)
     tables = {"files": [str(folder / "motions.h5")], "sensors": ["p", "q"], "training": [0], **data}
     study = Study.model_validate({"study": {"name": "lab"}, "data": tables})

@@ -138,6 +138,17 @@ def test_warnings_are_kept_with_the_stage_and_in_the_log(tmp_path: Path) -> None
     assert "third: " in log
 
 
+def test_damaged_results_are_said_and_computed_again(tmp_path: Path) -> None:
+    toy = Recorder()
+    assert toy.run(tmp_path).messages == ()
+    content = (tmp_path / "result.h5").read_bytes()
+    (tmp_path / "result.h5").write_bytes(content[: len(content) // 2])
+    again = toy.run(tmp_path)
+    assert again.computed == ("first", "second", "third")
+    assert len(again.messages) == 1
+    assert "moved to result.h5.damaged, its stages are computed again" in again.messages[0]
+
+
 def test_time_and_memory_are_measured(tmp_path: Path) -> None:
     size, pause = 64 * 2**20, 0.2
 

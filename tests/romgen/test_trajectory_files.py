@@ -35,6 +35,43 @@ def test_round_trip_keeps_every_bit(tmp_path: Path, suffix: str) -> None:
         assert np.array_equal(r.displacement, w.displacement)
 
 
+def test_sensors_that_a_file_names_are_found_by_name(tmp_path: Path) -> None:
+    """The order of a study is not that of the file."""
+    write_trajectories(tmp_path / "a.h5", [Trajectory("one", T, SENSORS, X)])
+    (read,) = read_trajectories([tmp_path / "a.h5"], ("upper", "lower"), "m")
+    assert np.array_equal(read.displacement, X[:, ::-1])
+    (read,) = read_trajectories([tmp_path / "a.h5"], ("upper",), "m")
+    assert np.array_equal(read.displacement, X[:, 1:])
+    (read,) = read_trajectories([tmp_path / "a.h5"], ("left", "right"), "m")  # new names for all of them
+    assert np.array_equal(read.displacement, X)
+    with pytest.raises(InputError, match="no such sensor; got middle; the file has lower, upper"):
+        read_trajectories([tmp_path / "a.h5"], ("upper", "middle"), "m")
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_hdf5_of_others(tmp_path: Path, flat: bool) -> None:
+    """Sensors first, time as a column, in mm; with or without a group."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        group = file if flat else file.create_group("run")
+        group["t"], group["x"] = T[:, None], 1e3 * X.T
+        group["x"].attrs["unit"] = "mm"
+    (read,) = read_trajectories([tmp_path / "a.h5"], SENSORS, "m")
+    assert read.name == ("a" if flat else "run")
+    assert read.displacement == pytest.approx(X, rel=1e-15)
+
+
+def test_npz_without_t(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", offset=1.0, displacement=X)
+    with pytest.raises(InputError, match="holds no trajectory; it needs arrays t and x"):
+        read_trajectories([tmp_path / "a.npz"], SENSORS, "m")
+
+
+def test_complex_displacement_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", t=T, x=X + 1j)
+    with pytest.raises(InputError, match="x is complex"):
+        read_trajectories([tmp_path / "a.npz"], SENSORS, "m")
+
+
 def test_mat_cells_are_sensor_by_time_in_the_given_unit(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "a.mat", {"xData": cells(X)})
     (read,) = read_trajectories([tmp_path / "a.mat"], SENSORS, "mm")
@@ -48,6 +85,25 @@ def test_mat_v73_cells(tmp_path: Path) -> None:
         file.create_dataset("xData", data=np.array([[t.ref], [x.ref]], dtype=h5py.ref_dtype), dtype=h5py.ref_dtype)
     (read,) = read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
     assert np.array_equal(read.displacement, X)
+
+
+@pytest.mark.parametrize("hdf5", [False, True])
+def test_mat_with_one_motion(tmp_path: Path, hdf5: bool) -> None:
+    if hdf5:
+        with h5py.File(tmp_path / "a.mat", "w") as file:
+            file["t"], file["x"] = T[:, None], X  # as MATLAB stores (n_sensor, n_time)
+    else:
+        scipy.io.savemat(tmp_path / "a.mat", {"t": T, "x": X.T})
+    (read,) = read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
+    assert np.array_equal(read.displacement, X)
+
+
+def test_mat_without_t_and_x(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "a.mat", {"time": T, "y": X})
+    with pytest.raises(
+        InputError, match=r"neither a cell array with columns t and x, nor t and x; got \['time', 'y'\]"
+    ):
+        read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
 
 
 def test_csv_units_of_the_header(tmp_path: Path) -> None:
@@ -91,9 +147,57 @@ def test_bad_data_are_named(tmp_path: Path, change: str, message: str) -> None:
         read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
 
 
+def test_one_sample_is_no_motion(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", t=T[:1], x=X[:1])
+    with pytest.raises(InputError, match="too few samples for a motion; got 1"):
+        read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
+
+
+def test_sensors_with_an_offset_are_named(tmp_path: Path) -> None:
+    """All sensors on one side of 0 show no motion about rest; one of them may."""
+    np.savez(tmp_path / "run.npz", t=T, x=X + np.array([2.0, -3.0]))
+    with pytest.raises(InputError, match=r"no sensor ever crosses 0.*of 'lower'; subtract what each sensor shows"):
+        read_trajectories([tmp_path / "run.npz"], SENSORS, "m")
+    np.savez(tmp_path / "run.npz", t=T, x=X + np.array([2.0, -0.5]))
+    assert len(read_trajectories([tmp_path / "run.npz"], SENSORS, "m")) == 1
+
+
 def test_csv_cell_that_is_no_number(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t [s],lower [m],upper [m]\n0,1,2\n1,x,2\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"a\.csv, line 3, column 2: not a number"):
+        read_trajectories([tmp_path / "a.csv"], SENSORS, "m")
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal", "encoding", "micro"),
+    [
+        (";", ",", "utf-8-sig", "\N{MICRO SIGN}m"),
+        ("\t", ".", "utf-8", "\N{GREEK SMALL LETTER MU}m"),
+        (",", ".", "utf-8-sig", "um"),
+    ],
+)
+def test_csv_of_spreadsheets(tmp_path: Path, separator: str, decimal: str, encoding: str, micro: str) -> None:
+    """Byte order mark, semicolons with decimal commas, tabs, both characters for micro, rows without any number."""
+    rows = [["t [s]", "Tr\u00e4ger links", f"upper [{micro}]"]]
+    rows += [[repr(t), repr(x[0]), repr(1e6 * x[1])] for t, x in zip(T.tolist(), X.tolist(), strict=True)]
+    lines = [
+        separator.join(cell if k == 0 else cell.replace(".", decimal) for cell in row) for k, row in enumerate(rows)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([*lines, 2 * separator, ""]), encoding=encoding)
+    (read,) = read_trajectories([tmp_path / "a.csv"], ("Tr\u00e4ger links", "upper"), "m")
+    assert np.array_equal(read.t, T)
+    assert read.displacement == pytest.approx(X, rel=1e-15)
+
+
+def test_csv_that_is_not_utf8(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,Tr\u00e4ger\n0,1\n", encoding="latin-1")
+    with pytest.raises(InputError, match="not UTF-8 text; save it as CSV in UTF-8"):
+        read_trajectories([tmp_path / "a.csv"], ("Tr\u00e4ger",), "m")
+
+
+def test_csv_line_numbers_count_empty_lines(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t [s],lower [m],upper [m]\n\n0,1,2\n1,x,2\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 4, column 2"):
         read_trajectories([tmp_path / "a.csv"], SENSORS, "m")
 
 

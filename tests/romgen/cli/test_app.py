@@ -12,6 +12,7 @@ from fmpy import read_model_description
 from typer.testing import CliRunner, Result
 
 import romgen
+from romgen.cli import report as report_command
 from romgen.cli import run as run_command
 from romgen.cli.app import app
 from romgen.errors import NumericalError
@@ -51,6 +52,38 @@ def test_missing_file(command: str, tmp_path: Path) -> None:
     result = romgen_cli(command, tmp_path / "gone.toml")
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("place", ["a_file", "a_file/below", "/proc/nowhere"])
+def test_a_run_folder_that_cannot_be_made_is_one_line(place: str, tmp_path: Path) -> None:
+    """A file in the way, a path below a file, a file system that takes no folders."""
+    write_lab_study(tmp_path)
+    (tmp_path / "a_file").write_text("in the way")
+    for more in ([], ["--json"]):
+        result = romgen_cli("learn", tmp_path / "study.toml", "--run-dir", tmp_path / place, *more)
+        assert result.exit_code == 2
+        assert len(result.stderr.splitlines()) == 1
+        assert "check the path and its permissions" in result.stderr
+    assert json.loads(result.stdout)["exit_code"] == 2
+
+
+def test_a_report_that_fails_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise NumericalError("did not converge")
+
+    write_lab_study(tmp_path)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "report.html").write_text("old")
+    monkeypatch.setattr(report_command, "bring_up_to_date", fail)
+    assert romgen_cli("report", tmp_path / "study.toml", "--run-dir", tmp_path / "run").exit_code == 3
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["report.html"]
+    assert (tmp_path / "run" / "report.html").read_text() == "old"
+
+
+def test_info_on_a_folder_that_holds_nothing(tmp_path: Path) -> None:
+    result = romgen_cli("info", tmp_path)
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+    assert "it has no result.h5 or study.toml" in result.stderr
 
 
 def test_problems_as_json(tmp_path: Path) -> None:

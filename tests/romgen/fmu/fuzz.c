@@ -2,29 +2,9 @@
    and no variable that can be read is ever undefined.
    Usage: fuzz LIBRARY N_SEQUENCE SEED. Prints "ok" and returns 0. */
 #include "interface.h"
+#include "random_arguments.h"
 
-#define N_CALL 30
 #define N_ACTION 20
-
-static unsigned long long random_state;
-
-static unsigned below(unsigned n)
-{
-    random_state = random_state * 6364136223846793005ULL + 1442695040888963407ULL;
-    return (unsigned)(random_state >> 33) % n;
-}
-
-static double number(void)
-{
-    const double odd[] = {NAN, INFINITY, -INFINITY, 0.0, -0.0, 1e308, -1e-308, -1.0};
-    return below(6) == 0 ? odd[below(8)] : 1e-3 * (double)below(2000) - 1.0;
-}
-
-static double step_length(void)
-{
-    const double odd[] = {NAN, 0.0, -H, INFINITY, 1e9};
-    return below(8) == 0 ? odd[below(5)] : H * (double)(1 + below(3));
-}
 
 static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                    fmi2String message, ...)
@@ -127,9 +107,6 @@ int main(int argc, char **argv)
 {
     CHECK(argc == 4);
     load(argv[1]);
-    random_state = strtoull(argv[3], NULL, 10);
-    for (long n = strtol(argv[2], NULL, 10); n > 0; --n)
-        sequence();
-    printf("ok\n");
+    fuzz(argv[2], argv[3], sequence);
     return 0;
 }

@@ -1,20 +1,7 @@
 /* Linked with the sources of an FMI 3.0 unit: goes through its interface without Python. Works for every choice of
    outputs and start values. Prints "ok" and returns 0, or names the first check that failed. */
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
+#include "check.h"
 #include "fmi3_instance.h"
-
-#define H 1e-4
-#define CHECK(condition)                                               \
-    do {                                                               \
-        if (!(condition)) {                                            \
-            fprintf(stderr, "line %d: %s\n", __LINE__, #condition);    \
-            exit(1);                                                   \
-        }                                                              \
-    } while (0)
 
 static const fmi3ValueReference state = VR_STATE, rate = VR_RATE, sensor = VR_SENSOR, gain = VR_INPUT_GAIN;
 static int n_message, n_update;
@@ -191,12 +178,47 @@ static void importers(void)
     fmi3FreeInstance(c);
 }
 
+/* An importer that does more within a step than it may: only inputs can be set, no step begins, nothing is freed. */
+static void restless(fmi3InstanceEnvironment e, fmi3Float64 time, fmi3Boolean set, fmi3Boolean get, fmi3Boolean finished,
+                     fmi3Boolean can_return, fmi3Boolean *early, fmi3Float64 *early_time)
+{
+    fmi3Instance c = *(fmi3Instance *)e;
+    fmi3FMUState saved = NULL;
+    fmi3Boolean event, terminate;
+    const fmi3ValueReference input = VR_INPUT;
+    const double one = 1.0;
+    double reached, value = 0.0;
+    (void)finished, (void)can_return;
+    CHECK(set != get && fmi3SetFloat64(c, &input, 1, &one, 1) == fmi3OK);
+    CHECK(fmi3DoStep(c, time, H, fmi3True, &event, &terminate, early, early_time) == fmi3Error);
+    CHECK((fmi3GetFloat64(c, &gain, 1, &value, 1) == fmi3OK) == get && (get || value == 0.0));
+    CHECK(get || fmi3SetFloat64(c, &gain, 1, &one, 1) == fmi3Error);
+    CHECK(get || (fmi3GetFMUState(c, &saved) == fmi3Error && fmi3Reset(c) == fmi3Error && fmi3Terminate(c) == fmi3Error));
+    CHECK(fmi3DoStep(c, time, H, fmi3True, &event, &terminate, early, &reached) == fmi3Error);
+    fmi3FreeInstance(c);
+    ++n_update;
+}
+
+static void steps_do_not_nest(void)
+{
+    fmi3Instance c;
+    c = fmi3InstantiateCoSimulation("cs", MODEL_GUID, NULL, fmi3False, fmi3True, fmi3False, fmi3False, NULL, 0, &c,
+                                    NULL, restless);
+    CHECK(c != NULL);
+    n_update = 0;
+    start(c);
+    steps(c, 0, 20);
+    CHECK(n_update >= 60); /* two updates or more within each step, one after it */
+    fmi3FreeInstance(c);
+}
+
 int main(void)
 {
     co_simulation();
     model_exchange();
     misuse();
     importers();
+    steps_do_not_nest();
     printf("ok\n");
     return 0;
 }

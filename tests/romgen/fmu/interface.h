@@ -3,11 +3,8 @@
 #define INTERFACE_H
 
 #include <dlfcn.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
+#include "check.h"
 #include "fmi2Functions.h"
 #include "model_sizes.h"
 
@@ -15,15 +12,6 @@
 #define N_REAL (2 * N_STATE + N_INPUT + 2 * N_SENSOR + 2 * N_MODE + 5 + 2 * N_MODE)
 #define FIRST_INPUT (2 * N_STATE)
 #define FIRST_SENSOR (FIRST_INPUT + N_INPUT)
-#define H 1e-4
-
-#define CHECK(condition)                                               \
-    do {                                                               \
-        if (!(condition)) {                                            \
-            fprintf(stderr, "line %d: %s\n", __LINE__, #condition);    \
-            exit(1);                                                   \
-        }                                                              \
-    } while (0)
 
 /* One pointer per function of the standard, named like the function. */
 #define ALL_FUNCTIONS(X)                                                                                         \

@@ -22,12 +22,19 @@ KINDS = {
 }
 
 
-def build(model: ReducedModel, kind: str, flags: tuple[str, ...], run_cc: Callable[..., None], folder: Path) -> Path:
+def build(
+    model: ReducedModel,
+    kind: str,
+    flags: tuple[str, ...],
+    run_cc: Callable[..., None],
+    folder: Path,
+    program: str = "harness3",
+) -> Path:
     for name, content in generated_sources3(model, "{g}", KINDS[kind]).items():
         (folder / name).write_bytes(content)
     files = sorted(p.name for p in folder.glob("*.c"))
-    run_cc(*C_FLAGS, *flags, "-I.", HERE / "harness3.c", *files, "-o", "harness3", "-lm", folder=folder)
-    return folder / "harness3"
+    run_cc(*C_FLAGS, *flags, "-I.", HERE / f"{program}.c", *files, "-o", program, "-lm", folder=folder)
+    return folder / program
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -41,3 +48,11 @@ def test_under_valgrind(kind: str, model: ReducedModel, run_cc: Callable[..., No
         pytest.skip("valgrind is not installed")
     program = build(model, kind, (), run_cc, tmp_path)
     run("valgrind", "-q", "--leak-check=full", "--error-exitcode=3", program)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("n_sequence", [2_500, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_random_call_sequences_under_sanitizers(
+    n_sequence: int, kind: str, model: ReducedModel, run_cc: Callable[..., None], tmp_path: Path
+) -> None:
+    run(build(model, kind, SANITIZERS, run_cc, tmp_path, "fuzz3"), n_sequence, 20261127)

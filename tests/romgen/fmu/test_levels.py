@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
+import re
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from romgen.errors import InputError
+from romgen.errors import InputError, RomgenError
 from romgen.fmu.archive import write_archive
+from romgen.fmu.compilers import host_platform
 from romgen.fmu.export import export_fmu
 from romgen.fmu.export3 import export_fmi3
 from romgen.fmu.levels import validate_unit
 from romgen.fmu.model_file import model_from_json, model_json
 from romgen.fmu.records import FmuExport, FmuInfo, LevelRow
+from romgen.fmu.unit_facts import unit_facts
 from romgen.polynomial import evaluate, zeta
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
 from romgen.stability import tried_stability
+from tests.romgen.fmu.damage import damaged
 from tests.romgen.fmu.models import duffing_chain, random_model, random_states
 
 
@@ -98,6 +104,72 @@ def test_what_cannot_be_checked_is_said(pythonfmu_unit: FmuExport, model: Reduce
         levels = validate_unit(Path(path))
         assert {r.level for r in levels.rows} == {"L0"}
         assert "L1 to L3 need" in levels.notes[0]
+
+
+LIBRARY = "binaries/linux64/random_panel.so"
+DAMAGE = [
+    (lambda b: b[: len(b) // 2], "cannot be loaded: its process ended with code"),
+    (lambda b: b"", "cannot be loaded: OSError: random_panel.so: file too short"),
+]
+
+
+@pytest.mark.skipif(host_platform() != "linux64", reason="messages of the Linux loader")
+@pytest.mark.parametrize(("damage", "message"), DAMAGE)
+def test_a_damaged_library_is_a_missed_check_not_a_crash(
+    damage, message: str, native: FmuExport, tmp_path: Path
+) -> None:
+    with zipfile.ZipFile(native.path) as archive:
+        content = archive.read(LIBRARY)
+    levels = validate_unit(changed_unit(native, tmp_path / "x.fmu", LIBRARY, damage(content)))
+    assert "libraries for this machine that cannot be loaded" in [r.check for r in levels.rows if not r.passed]
+    assert any(message in problem for problem in levels.problems)
+    assert {r.level for r in levels.rows} == {"L0"}
+
+
+def test_a_model_of_another_unit_is_named(native: FmuExport, tmp_path: Path) -> None:
+    unit = changed_unit(native, tmp_path / "x.fmu", "resources/rom.json", model_json(duffing_chain(3)).encode())
+    with pytest.raises(InputError, match=r"belongs to another unit; got 6 states and 1 inputs, .* has 4 and 2"):
+        validate_unit(unit)
+
+
+@pytest.mark.parametrize("pattern", [r"<DefaultExperiment[^>]*/>", r'stepSize="[^"]*"'])
+def test_without_a_default_step_nothing_is_measured(pattern: str, native: FmuExport, tmp_path: Path) -> None:
+    with zipfile.ZipFile(native.path) as archive:
+        text, count = re.subn(pattern, "", archive.read("modelDescription.xml").decode())
+    assert count == 1
+    levels = validate_unit(changed_unit(native, tmp_path / "x.fmu", "modelDescription.xml", text.encode()))
+    assert {r.level for r in levels.rows} == {"L0"}
+    assert "with a default step" in levels.notes[0]
+
+
+def test_coefficients_that_are_missing_or_short_are_named(model: ReducedModel, tmp_path: Path) -> None:
+    unit = export_fmu(model, tmp_path / "x.fmu", FmuSettings(coefficients="file", platforms=()))
+    table = "resources/coefficients.bin"
+    with zipfile.ZipFile(unit.path) as archive:
+        files = {entry: archive.read(entry) for entry in archive.namelist()}
+    write_archive(tmp_path / "missing.fmu", {name: data for name, data in files.items() if name != table})
+    with pytest.raises(InputError, match=r"missing.fmu: resources/rom.json: .*coefficients.bin .* is missing"):
+        validate_unit(tmp_path / "missing.fmu")
+    write_archive(tmp_path / "short.fmu", {**files, table: files[table][:-8]})
+    with pytest.raises(InputError, match=r"coefficients.bin has \d+ numbers, the model \d+"):
+        validate_unit(tmp_path / "short.fmu")
+
+
+def test_damaged_units_get_a_verdict_or_one_sentence(model: ReducedModel, tmp_path: Path) -> None:
+    """Random damage to description and model never ends in a stack trace."""
+    rng = np.random.default_rng(3)
+    unit = export_fmu(model, tmp_path / "x.fmu", FmuSettings(platforms=()))
+    with zipfile.ZipFile(unit.path) as archive:
+        files = {entry: archive.read(entry) for entry in archive.namelist()}
+    root = ElementTree.fromstring(files["modelDescription.xml"])
+    for _ in range(40):
+        text, rom = ElementTree.tostring(damaged(root, rng)), bytearray(files["resources/rom.json"])
+        first = int(rng.integers(len(rom)))
+        rom[first : first + int(rng.integers(100))] = b"\xff"
+        write_archive(tmp_path / "y.fmu", {**files, "modelDescription.xml": text, "resources/rom.json": bytes(rom)})
+        for judge in (validate_unit, unit_facts):
+            with contextlib.suppress(RomgenError):
+                judge(tmp_path / "y.fmu")
 
 
 def test_a_figure_that_is_not_a_number_does_not_pass() -> None:

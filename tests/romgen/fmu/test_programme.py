@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from romgen.errors import InputError
-from romgen.fmu.programme import fold_conjugates, monomial_programme
+from romgen.fmu.programme import complex_programme, fold_conjugates, monomial_programme
 from romgen.polynomial import evaluate, exponents, monomials, zeta
 from romgen.reduced_model import ReducedModel
 from tests.romgen.fmu.models import random_states
@@ -24,6 +24,40 @@ def test_each_monomial_is_one_product_of_earlier_ones(table: np.ndarray) -> None
     position = [programme.index[tuple(row)] for row in table]
     # At most 7 factors, each product rounds once: 8 units in the last place.
     np.testing.assert_allclose(np.array(values)[position], monomials(x[None], table)[0], rtol=8 * np.finfo(float).eps)
+
+
+@pytest.mark.parametrize(
+    "table", [exponents(4, 1, 7), np.array([[2, 1, 3, 0], [0, 4, 1, 2], [1, 1, 1, 1], [1, 0, 1, 0]])]
+)
+def test_complex_monomials_take_their_pairs_out(table: np.ndarray) -> None:
+    """Products hold no variable with its own conjugate, but for the pair itself; the rest is times a real number."""
+    programme = complex_programme(table)
+    rng = np.random.default_rng(1)
+    z = rng.uniform(-1.0, 1.0, 2) + 1j * rng.uniform(-1.0, 1.0, 2)
+    values = [*z, *z.conj()]
+    for left, right in programme.products:
+        values.append(values[left] * values[right])
+    for left, mode in programme.pairs:
+        values.append(values[left] * abs(z[mode]) ** 2)
+    assert len(values) == programme.n_monomial
+    position = [programme.index[tuple(row)] for row in table]
+    expected = monomials(np.array([[*z, *z.conj()]]), table)[0]
+    # At most 8 factors; a complex product is off by sqrt(5) units of rounding (Brent, Percival, Zimmermann 2007).
+    np.testing.assert_allclose(np.array(values)[position], expected, rtol=8 * np.sqrt(5.0) * np.finfo(float).eps)
+    bare = [row for row, k in programme.index.items() if k < 4 + len(programme.products) and sum(row) > 2]
+    assert not any(row[j] and row[2 + j] for row in bare for j in range(2))
+
+
+def test_products_of_a_full_table_come_in_few_runs() -> None:
+    """One run for each variable and degree from 2 on: all that they read lies before what they write."""
+    programme = monomial_programme(exponents(4, 1, 7))
+    assert len(programme.runs) == 4 * 6
+    position = 4
+    for left, factor, count in programme.runs:
+        assert left + count <= position
+        assert factor < 4
+        position += count
+    assert position == programme.n_monomial
 
 
 def test_a_full_table_needs_no_extra_monomials() -> None:

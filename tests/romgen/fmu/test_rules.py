@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from romgen.errors import InputError
@@ -15,6 +16,7 @@ from romgen.fmu.records import FmuExport
 from romgen.fmu.rules import STRUCTURED, archive_problems, description_problems, rule_problems
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
+from tests.romgen.fmu.damage import damaged
 
 
 @pytest.fixture(scope="module")
@@ -99,9 +101,9 @@ FAULTS = [
 
 @pytest.mark.parametrize(("pattern", "replacement", "message"), FAULTS, ids=[f"{f[2]}-{f[0][:12]}" for f in FAULTS])
 def test_each_seeded_fault_is_found(text: str, pattern: str, replacement: str, message: str | None) -> None:
-    damaged, count = re.subn(pattern, replacement, text, count=1)
+    faulty, count = re.subn(pattern, replacement, text, count=1)
     assert count == 1
-    found = description_problems(ElementTree.fromstring(damaged))
+    found = description_problems(ElementTree.fromstring(faulty))
     assert any(message in problem for problem in found) if message else found == ()
 
 
@@ -125,6 +127,16 @@ def test_faults_of_the_archive_are_found(text: str) -> None:
         ([], "neither a binary nor"),
     ):
         assert any(message in problem for problem in archive_problems(root, names))
+
+
+def test_damaged_descriptions_are_judged_to_the_end(text: str) -> None:
+    """Whatever is missing or unreadable in a unit of others becomes a sentence, nothing stops the rules."""
+    rng, root = np.random.default_rng(1), ElementTree.fromstring(text)
+    for _ in range(300):
+        found = description_problems(damaged(root, rng))
+        assert all(isinstance(problem, str) and problem for problem in found)
+    broken = re.sub(r'(<SimpleType name="Displacement">\s*<Real)', r'\1 min="low"', text, count=1)
+    assert any("cannot be read (could not" in p for p in description_problems(ElementTree.fromstring(broken)))
 
 
 def test_a_file_that_is_no_unit_is_refused(tmp_path: Path) -> None:

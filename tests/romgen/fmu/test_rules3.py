@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from romgen.fmu.export3 import export_fmi3
@@ -14,6 +15,7 @@ from romgen.fmu.rules import description_problems3, rule_problems
 from romgen.fmu.rules3 import archive_problems3
 from romgen.reduced_model import ReducedModel
 from romgen.settings import FmuSettings
+from tests.romgen.fmu.damage import damaged
 from tests.romgen.fmu.models import random_model
 
 
@@ -71,9 +73,9 @@ FAULTS = [
 
 @pytest.mark.parametrize(("pattern", "replacement", "message"), FAULTS, ids=[f"{f[2]}-{f[0][:12]}" for f in FAULTS])
 def test_each_seeded_fault_is_found(text: str, pattern: str, replacement: str, message: str) -> None:
-    damaged, count = re.subn(pattern, replacement, text, count=1)
+    faulty, count = re.subn(pattern, replacement, text, count=1)
     assert count == 1
-    assert any(message in problem for problem in description_problems3(ElementTree.fromstring(damaged)))
+    assert any(message in problem for problem in description_problems3(ElementTree.fromstring(faulty)))
 
 
 def test_faults_of_the_archive_are_found(text: str) -> None:
@@ -91,3 +93,10 @@ def test_faults_of_the_archive_are_found(text: str) -> None:
         ([], None, "neither a binary nor"),
     ):
         assert any(message in problem for problem in archive_problems3(root, names, build))
+
+
+def test_damaged_descriptions_are_judged_to_the_end(text: str) -> None:
+    rng, root = np.random.default_rng(2), ElementTree.fromstring(text)
+    for _ in range(300):
+        found = description_problems3(damaged(root, rng))
+        assert all(isinstance(problem, str) and problem for problem in found)

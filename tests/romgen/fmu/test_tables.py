@@ -92,6 +92,14 @@ def test_a_cut_table_is_no_model(model: ReducedModel) -> None:
         model_from_json(text.decode(), table[:-8])
 
 
+def test_a_table_of_another_layout_is_no_model(model: ReducedModel) -> None:
+    """A unit written before the order of the numbers changed must not be misread."""
+    text, table = (data for _, data in sorted(model_resources(model, in_file=True).items(), reverse=True))
+    for old in (text.replace(b', "layout": 2', b""), text.replace(b'"layout": 2', b'"layout": 1')):
+        with pytest.raises(InputError, match="was written by another version of romgen; export the unit again"):
+            model_from_json(old.decode(), table)
+
+
 def test_every_way_to_write_the_location(unpacked_file: Path) -> None:
     folder = unpacked_file / "resources"
     uri = folder.as_uri()

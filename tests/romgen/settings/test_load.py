@@ -76,6 +76,13 @@ MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_set("materials", "steel", "young_modulus", to="210 GN"), "young_modulus: unknown unit 'GN', accepted are Pa"),
     (_set("materials", "steel", "density", to=-1.0), "[materials.steel] density: Input should be greater than 0"),
     (_set("materials", "steel", "density", to=float("inf")), "density: Input should be a finite number"),
+    (
+        _set("materials", "steel", "density", to=True),
+        "[materials.steel] density: true and false are no numbers; got True",
+    ),
+    (_set("forced_response", "levels", to=[1.0, True]), "[forced_response] levels: true and false are no numbers"),
+    (_set("forced_response", "levels", to=[1.0, 0.0]), "[forced_response] levels must not be 0; got [1.0, 0.0]"),
+    (_set("forced_response", "frequency_range_hz", to=[115.0, 105.0]), "frequency_range_hz must rise; got [115, 105]"),
     (_set("study", "name", to="two words"), "[study] name:"),
     (_set("blocks", "bar", "material", to="stel"), "unknown material 'stel'; did you mean 'steel'?"),
     (_set("blocks", "bar", "cells_x", to=[2, 2]), "[blocks.bar] x has 1 intervals but cells_x has 2 numbers"),
