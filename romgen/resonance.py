@@ -84,6 +84,8 @@ def automatic_resonance(eigenvalues: ComplexArray, exponents: IntArray) -> Reson
     any other by the tolerance in the middle of the gap.
     """
     low = exponents[exponents.sum(axis=1) <= GAP_ORDER]
+    if len(_near_detunings(eigenvalues, low)) < 2:
+        return trivial_resonance(eigenvalues, exponents)
     below, above, gap = _widest_gap(eigenvalues, low)
     kept = _detuning(eigenvalues, low) <= 0.5 * (below + above)
     for table in _named_tables(eigenvalues, low):
@@ -104,7 +106,10 @@ def gap_resonance(eigenvalues: ComplexArray, exponents: IntArray) -> ResonanceTa
     product that is detuned twice as far as the resonance itself then counts as non-resonant, unlike in
     ``automatic_resonance``. The integers are those that all kept terms satisfy, () where there are none.
     """
-    below, above, gap = _widest_gap(eigenvalues, exponents[exponents.sum(axis=1) <= GAP_ORDER])
+    low = exponents[exponents.sum(axis=1) <= GAP_ORDER]
+    if len(_near_detunings(eigenvalues, low)) < 2:
+        return trivial_resonance(eigenvalues, exponents)
+    below, above, gap = _widest_gap(eigenvalues, low)
     tolerance = float(np.sqrt(below * above)) if below > 0.0 else 0.5 * above
     table = tolerance_resonance(eigenvalues, exponents, tolerance)
     integers: tuple[int, ...] = ()
@@ -115,10 +120,16 @@ def gap_resonance(eigenvalues: ComplexArray, exponents: IntArray) -> ResonanceTa
     return replace(table, internal_resonance=integers, reason=f"{table.reason}; {gap}")
 
 
+def _near_detunings(eigenvalues: ComplexArray, low: IntArray) -> FloatArray:
+    """Return the different detunings of ``low`` up to the slowest frequency, ascending, rad/s."""
+    detuning = _detuning(eigenvalues, low)
+    near: FloatArray = np.unique(np.round(detuning[detuning <= eigenvalues.imag.min()], decimals=9))
+    return near
+
+
 def _widest_gap(eigenvalues: ComplexArray, low: IntArray) -> tuple[float, float, str]:
     """Return the edges in rad/s of the widest gap of the frequency detunings of ``low``, and a sentence."""
-    detuning = _detuning(eigenvalues, low)
-    steps = np.unique(np.round(detuning[detuning <= eigenvalues.imag.min()], decimals=9))
+    steps = _near_detunings(eigenvalues, low)
     widest = int(np.diff(steps).argmax())
     below, above = float(steps[widest]), float(steps[widest + 1])
     return below, above, f"detunings up to {below:.4g} rad/s lie below the widest gap, the next is {above:.4g} rad/s"

@@ -238,8 +238,8 @@ def _learn_problems(study: Study) -> Iterator[str]:
     resonance = learn.internal_resonance
     if resonance not in ("auto", "gap", ()) and len(resonance) != len(learn.master_modes):
         yield f"[learn] internal_resonance needs one integer per master mode; got {list(resonance)}"
-    if isinstance(learn.order, int) and not 1 <= learn.order <= 9:
-        yield f"[learn] order must be 1 to 9 or 'auto'; got {learn.order}"
+    if isinstance(learn.order, int) and not 2 <= learn.order <= 9:
+        yield f"[learn] order must be 2 to 9 or 'auto'; got {learn.order}"
 
 
 def _downstream_problems(study: Study) -> Iterator[str]:
