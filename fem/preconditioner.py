@@ -72,13 +72,15 @@ class Preconditioner:
         w = self._rotation(u - start)
 
         def solve(residual: FloatArray, live: IntArray) -> FloatArray:
+            if len(groups) == 1:
+                turn = w if len(live) == n_case else np.ascontiguousarray(w[:, live])
+                return _turned(groups[0][1], turn, residual)
             result = np.empty_like(residual)
             for cases, solver in groups:
                 columns = np.flatnonzero(np.isin(live, cases))
                 if len(columns):
                     turn = np.ascontiguousarray(w[:, live[columns]])
-                    back = rotate(turn, -1.0, np.ascontiguousarray(residual[:, columns]))
-                    result[:, columns] = rotate(turn, 1.0, solver.solve(back).reshape(back.shape))
+                    result[:, columns] = _turned(solver, turn, np.ascontiguousarray(residual[:, columns]))
             return result
 
         return solve
@@ -107,3 +109,9 @@ class Preconditioner:
                 self._factors.pop(next(iter(self._factors)))
         self._factors[key] = solver
         return solver
+
+
+def _turned(solver: LinearSolver, w: FloatArray, residual: FloatArray) -> FloatArray:
+    """R A^-1 R' r with the rotation vectors w (n_dof, n_case) of the nodes."""
+    back = rotate(w, -1.0, residual)
+    return rotate(w, 1.0, solver.solve(back).reshape(back.shape))

@@ -18,6 +18,7 @@ from fem.contact import ContactState
 from fem.dynamics import Dynamics
 from fem.generalized_alpha import Scheme
 from fem.motion import Effort, MotionState, SolvedStep, StepRecord
+from fem.step_sums import balanced, displaced
 
 _ROUNDOFF = 1e-10
 """Share of the momentum that the residual of a step may not resolve: a body in free flight has no other force."""
@@ -80,6 +81,8 @@ class StepEquation:
         self._linear = (1.0 - scheme.alpha_m) * dynamics.model.mass + (
             1.0 - scheme.alpha_f
         ) * step * scheme.gamma * dynamics.damping_matrix
+        of_acceleration = (step**2 * scheme.beta, dynamics.alpha, dynamics.beta)
+        self._weights = (*of_acceleration, 1.0 - scheme.alpha_m, 1.0 - scheme.alpha_f, step * scheme.gamma)
 
     def matrix(self, stiffness: sp.csr_matrix, viscous: sp.csr_matrix) -> sp.csr_matrix:
         """d r / d a without the low-rank inertia, from d f / d u and d f / d v in N/m and N s/m, constrained."""
@@ -119,19 +122,13 @@ class StepEquation:
         """Residual of the equation at a (n_dof, n_case) m/s^2."""
         h, s, dynamics = self.step, self.scheme, self.dynamics
         inertia, stiffness = dynamics.linear(a)
-        u = problem.u0 + h * h * s.beta * a
-        v = problem.v0 + h * s.gamma * a
+        u, v = displaced((problem.u0, problem.v0), a, (h * h * s.beta, h * s.gamma))
         contact = dynamics.contact(u, problem.slip)
         force, viscous, strain = dynamics.model.cell_forces(u, v, dynamics.beta)
-        linear = problem.linear + h * h * s.beta * stiffness
-        strain += 0.5 * np.einsum("nc,nc->c", u, linear)
-        force += linear
-        force += dynamics.contact_force(contact)
-        damping = dynamics.alpha * inertia + dynamics.beta * stiffness
-        residual = (1.0 - s.alpha_m) * (inertia + self.correct_inertia(a)) + problem.constant
-        residual += (1.0 - s.alpha_f) * (h * s.gamma * damping + force + viscous)
-        residual *= dynamics.mask
-        return Trial(force, viscous, inertia, damping, strain, contact, residual)
+        at = (u, inertia, stiffness, self.correct_inertia(a), dynamics.contact_force(contact), viscous)
+        given = (problem.constant, problem.linear, dynamics.mask)
+        damping, residual, energy = balanced(at, given, self._weights, force)
+        return Trial(force, viscous, inertia, damping, strain + energy, contact, residual)
 
     def finish(
         self, old: MotionState, problem: StepProblem, solved: SolvedStep, loads: tuple[FloatArray, FloatArray]
