@@ -171,7 +171,7 @@ def test_frequency_and_damping_of_the_benchmark(trc: Learned, amplitude: float) 
     bending = trc.training[0]
     hz, damping = rates(bending.t, bending.displacement[:, 1], amplitude)
     model_hz, model_damping = rates(bending.t, bending.predicted[:, 1], amplitude)
-    assert model_damping == pytest.approx(damping, rel=0.02)
+    assert model_damping == pytest.approx(damping, rel=OWN_DAMPING)
     assert model_hz == pytest.approx(hz, rel=FREQUENCY_ERROR)
 
 
@@ -181,9 +181,10 @@ def published(panel: ReducedModel, load: InputLoad) -> list[ForcedCurve]:
 
 
 # Read off a figure: half a line width is 0.01 mm. Damping of the published model at its peaks (TRC.md C.2 at 108.5 and
-# 104.9 Hz: 0.493 and 0.538 %) against that of the bending decay at these frequencies (0.503 and 0.518 %): at resonance
-# amplitudes go with its inverse. Linear frequencies differ by 0.2 Hz.
-READ_M, DAMPING, LINEAR_HZ = 0.01e-3, (0.020, 0.038), 0.2
+# 104.9 Hz, torsion following: 0.492 and 0.530 %) against that of the bending decay at these frequencies (0.503 and
+# 0.518 %), and of our model against that decay (tested above): at resonance amplitudes go with its inverse. Linear
+# frequencies differ by 0.2 Hz.
+READ_M, DAMPING, OWN_DAMPING, LINEAR_HZ = 0.01e-3, (0.022, 0.022), 0.02, 0.2
 PEAKS_M = (0.62e-3, 1.29e-3)
 
 
@@ -191,6 +192,7 @@ PEAKS_M = (0.62e-3, 1.29e-3)
 def test_published_response_from_its_lower_peak(panel: ReducedModel) -> None:
     """Calibrated on the peak at 2 m/s2 alone: 4 m/s2 and all folds (TRC.md B.2: largest displacement at mid).
 
+    Our own error of damping, about the same at both peaks, is in the load.
     A peak that errs by a share d moves its fold by 2 (f_0 - f) d, f_0 - f being quadratic in the amplitude.
     """
     peak = {"level": 2.0, "frequency_hz": 108.5, "sensor": "mid", "amplitude": 0.62e-3, "measure": "max", "peak": True}
@@ -215,7 +217,7 @@ def test_published_response_from_the_participation(panel: ReducedModel) -> None:
     table = ForcingSettings(participation={"mid": (PARTICIPATION, 0.0)})
     curves = published(panel, calibrate_forcing(panel, {"base_acceleration": table}).loads[0])
     for curve, damping, peak in zip(curves, DAMPING, PEAKS_M, strict=True):
-        assert curve.peak_m == pytest.approx(peak, rel=damping + READ_M / peak)
+        assert curve.peak_m == pytest.approx(peak, rel=damping + OWN_DAMPING + READ_M / peak)
 
 
 @pytest.mark.slow
