@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from romgen.arrays import FloatArray
 from romgen.backbone import backbone
 from romgen.forced_curve import ForcedCurve
 from romgen.forced_response import forced_response
@@ -15,6 +16,8 @@ from romgen.forcing import sensor_shapes
 from romgen.learn import Learned, learn
 from romgen.lifted_orbit import Measure
 from romgen.load_calibration import Forcing, InputLoad, calibrate_forcing
+from romgen.load_fit import FREQUENCY_ERROR
+from romgen.metrics import analytic_signal
 from romgen.model_stages import RingDowns
 from romgen.pipeline import run
 from romgen.reduced_model import ReducedModel
@@ -129,13 +132,47 @@ def test_given_participation_says_what_the_model_leaves_out(learned: Learned) ->
     assert said == pytest.approx(point.input_change_percent, abs=0.1)
 
 
-@pytest.fixture(scope="module")
-def panel() -> ReducedModel:
-    """Order 7, which cross-validation chooses too."""
+@pytest.fixture(scope="module", params=["auto", 7])
+def trc(request: pytest.FixtureRequest) -> Learned:
+    """The order that cross-validation chooses, 5, and the order of the published backbone."""
     if not TRC.is_file():
         pytest.skip(f"{TRC} is absent")
     motions = read_trajectories([TRC], ("lower", "mid", "upper"), "m")
-    return learn(motions, [], LearnSettings(internal_resonance=(1, 2), order=7), "benchmark").model
+    return learn(motions, [], LearnSettings(internal_resonance=(1, 2), order=request.param), "benchmark")
+
+
+@pytest.fixture(scope="module")
+def panel(trc: Learned) -> ReducedModel:
+    return trc.model
+
+
+def rates(t: FloatArray, x: FloatArray, amplitude: float) -> tuple[float, float]:
+    """Frequency in Hz and damping ratio where the bending part of x (70 to 150 Hz) last has an amplitude.
+
+    Slopes of parabolas through phase and logarithm of the amplitude over 0.1 s, so that a rate that itself changes with
+    the decay is read off in the middle.
+    """
+    signal = analytic_signal(t, x, (70.0, 150.0))
+    middle, half = int(np.flatnonzero(np.abs(signal) >= amplitude)[-1]), round(0.05 / (t[1] - t[0]))
+    rows = slice(middle - half, middle + half + 1)
+    decay = np.polyfit(t[rows] - t[middle], np.log(np.abs(signal[rows])), 2)[1]
+    turn = np.polyfit(t[rows] - t[middle], np.unwrap(np.angle(signal[rows])), 2)[1]
+    return float(turn) / (2.0 * np.pi), -float(decay / turn)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("amplitude", [0.2e-3, 0.3e-3, 0.45e-3, 0.6e-3, 0.8e-3, 1.0e-3, 1.2e-3])
+def test_frequency_and_damping_of_the_benchmark(trc: Learned, amplitude: float) -> None:
+    """Bending decay, data and model read alike.
+
+    Limits: damping within the 2 % aimed at for forced amplitudes, which at resonance go with its inverse; frequency
+    within what a calibration allows a point.
+    """
+    bending = trc.training[0]
+    hz, damping = rates(bending.t, bending.displacement[:, 1], amplitude)
+    model_hz, model_damping = rates(bending.t, bending.predicted[:, 1], amplitude)
+    assert model_damping == pytest.approx(damping, rel=OWN_DAMPING)
+    assert model_hz == pytest.approx(hz, rel=FREQUENCY_ERROR)
 
 
 def published(panel: ReducedModel, load: InputLoad) -> list[ForcedCurve]:
@@ -143,23 +180,35 @@ def published(panel: ReducedModel, load: InputLoad) -> list[ForcedCurve]:
     return [response(model, level, (98.0, 116.0), "max") for level in (2.0, 4.0)]
 
 
-# Read off a figure: half a line width is 0.01 mm. Damping of the published model and of this one differ by 4 % at equal
-# frequency (TRC.md C.2 against B.3), and their linear frequencies by 0.2 Hz.
-READ_M, DAMPING, LINEAR_HZ = 0.01e-3, 0.04, 0.2
+# Read off a figure: half a line width is 0.01 mm. Damping of the published model at its peaks (TRC.md C.2 at 108.5 and
+# 104.9 Hz, torsion following: 0.492 and 0.530 %) against that of the bending decay at these frequencies (0.503 and
+# 0.518 %), and of our model against that decay (tested above): at resonance amplitudes go with its inverse. Linear
+# frequencies differ by 0.2 Hz.
+READ_M, DAMPING, OWN_DAMPING, LINEAR_HZ = 0.01e-3, (0.022, 0.022), 0.02, 0.2
+PEAKS_M = (0.62e-3, 1.29e-3)
 
 
 @pytest.mark.slow
 def test_published_response_from_its_lower_peak(panel: ReducedModel) -> None:
-    """Calibrated on the peak at 2 m/s2 alone: 4 m/s2 and all folds (TRC.md B.2: largest displacement at mid)."""
+    """Calibrated on the peak at 2 m/s2 alone: 4 m/s2 and all folds (TRC.md B.2: largest displacement at mid).
+
+    Our own error of damping, about the same at both peaks, is in the load.
+    A peak that errs by a share d moves its fold by 2 (f_0 - f) d, f_0 - f being quadratic in the amplitude.
+    """
     peak = {"level": 2.0, "frequency_hz": 108.5, "sensor": "mid", "amplitude": 0.62e-3, "measure": "max", "peak": True}
     load = forcing(panel, peak).loads[0]
-    assert sensor_shapes(panel)[1, 0] * load.modal_load[0] == pytest.approx(PARTICIPATION, rel=0.06)
+    of_lower, of_upper = (d + READ_M / m for d, m in zip(DAMPING, PEAKS_M, strict=True))
+    assert sensor_shapes(panel)[1, 0] * load.modal_load[0] == pytest.approx(PARTICIPATION, rel=of_lower)
     lower, upper = published(panel, load)
-    assert lower.peak_m == pytest.approx(0.62e-3, rel=1e-3)
-    assert upper.peak_m == pytest.approx(1.29e-3, rel=DAMPING + READ_M / 0.62e-3 + READ_M / 1.29e-3)
-    for curve, folds in ((lower, (108.53, 109.05)), (upper, (104.87, 108.08))):
-        np.testing.assert_allclose(np.sort(curve.folds_hz), folds, atol=LINEAR_HZ + 0.1)
-    assert upper.peak_hz == pytest.approx(104.9, abs=LINEAR_HZ + 0.05)
+    assert lower.peak_m == pytest.approx(PEAKS_M[0], rel=1e-3)
+    assert upper.peak_m == pytest.approx(PEAKS_M[1], rel=of_lower + of_upper)
+    per_share = 2.0 * (panel.eigenvalues[0].imag / (2.0 * np.pi) - 104.87)
+    expected = 104.87 - per_share * (upper.peak_m / PEAKS_M[1] - 1.0)
+    np.testing.assert_allclose(np.sort(lower.folds_hz), (108.53, 109.05), atol=LINEAR_HZ + 0.1)
+    at_peak, other = np.sort(upper.folds_hz)
+    assert at_peak == pytest.approx(expected, abs=LINEAR_HZ + per_share * READ_M / PEAKS_M[1])
+    assert other == pytest.approx(108.08, abs=LINEAR_HZ + 0.1)
+    assert upper.peak_hz == pytest.approx(at_peak, abs=0.05)
 
 
 @pytest.mark.slow
@@ -167,8 +216,8 @@ def test_published_response_from_the_participation(panel: ReducedModel) -> None:
     """1.32 at mid follows from a flat strip (TRC.md A.4): both peaks, nothing measured."""
     table = ForcingSettings(participation={"mid": (PARTICIPATION, 0.0)})
     curves = published(panel, calibrate_forcing(panel, {"base_acceleration": table}).loads[0])
-    for curve, peak in zip(curves, (0.62e-3, 1.29e-3), strict=True):
-        assert curve.peak_m == pytest.approx(peak, rel=DAMPING + READ_M / peak)
+    for curve, damping, peak in zip(curves, DAMPING, PEAKS_M, strict=True):
+        assert curve.peak_m == pytest.approx(peak, rel=damping + OWN_DAMPING + READ_M / peak)
 
 
 @pytest.mark.slow
