@@ -182,6 +182,8 @@ def test_two_inputs_are_two_columns(known: ReducedModel) -> None:
     columns = [chart_input_matrix(known, load.modal_load[:, None])[:, 0] for load in forcing.loads]
     np.testing.assert_array_equal(model.input_matrix, np.column_stack(columns))
     np.testing.assert_allclose(forcing.loads[1].modal_load, np.array([0.9, -0.5]) / SHAPES[2], rtol=1e-12)
+    with pytest.raises(InputError, match="load inputs already; got base_acceleration, hammer; find all loads in one"):
+        forcing.applied(model)
 
 
 def test_notes_say_what_the_load_rests_on(known: ReducedModel) -> None:
