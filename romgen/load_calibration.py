@@ -78,7 +78,7 @@ class InputLoad:
     source : "points" or "participation".
     modal_load : (m,) f of eta'' = ... + f u, in the data's own normalisation of eta (m).
     deviation_percent : (m,) standard deviation of f; nan where f is 0 or was given.
-    spread_percent : weighted standard deviation of the deviations of the points; nan for one point or none.
+    spread_percent : weighted standard deviation of the deviations of the points; nan for no more points than loads.
     points : the measured points.
     notes : what a user has to know.
     """
@@ -100,7 +100,19 @@ class Forcing:
     loads: tuple[InputLoad, ...]
 
     def applied(self, model: ReducedModel) -> ReducedModel:
-        """Return the model with these inputs."""
+        """Return the model with these inputs.
+
+        Raises
+        ------
+        InputError : the model has inputs already, which these would replace.
+        """
+        if model.inputs:
+            raise InputError(
+                "the model has load inputs already",
+                where=f"model {model.name}",
+                value=", ".join(model.inputs),
+                advice="find all loads in one call and apply them to the model as learned",
+            )
         columns = np.column_stack([load.modal_load for load in self.loads])
         return with_inputs(
             model, tuple(load.input for load in self.loads), tuple(load.unit for load in self.loads), columns

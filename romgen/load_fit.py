@@ -172,10 +172,17 @@ def _several(problem: LoadProblem, start: FloatArray, sigma: FloatArray) -> tupl
     tried.sort(key=lambda one: one[0])
     f = start.copy()
     f[loaded] *= tried[0][1]
-    if tried[1][0] - tried[0][0] > TOLD_APART:
+    # a start with wrong signs may end at the right ones: then no other signs fit
+    others = [cost for cost, share in tried if _signs(share) != _signs(tried[0][1])]
+    if not others or others[0] - tried[0][0] > TOLD_APART:
         return f, ()
     modes = ", ".join(str(j + 1) for j in loaded)
     return f, (f"the points do not tell the relative signs of the loads on modes {modes}: the best fit was taken",)
+
+
+def _signs(share: FloatArray) -> tuple[float, ...]:
+    """Return the signs relative to the first."""
+    return tuple((np.sign(share) * np.sign(share[0])).tolist())
 
 
 def _residual(problem: LoadProblem, start: FloatArray, share: FloatArray) -> FloatArray:

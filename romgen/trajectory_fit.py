@@ -1,4 +1,4 @@
-"""A normal form fitted on whole trajectories: band-passed start, multiple shooting, growing order, refinement."""
+"""A normal form fitted on whole trajectories: better of two starts, multiple shooting, growing order, refinement."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def growing_fits(
     orders: Sequence[int],
     settings: tuple[Resonance, float, LinearPart | None],
 ) -> Iterator[NormalFormFit]:
-    """Start from band-passed modal coordinates at order 3, refine, grow to the next odd order, refine, ..
+    """Start at order 3 from band-passed modes or the direct fit, refine, grow to the next odd order, refine, ..
 
     An order that is asked for is then refined once more with dissipation demanded in and around the trained range;
     growth goes on from the fit without. Up to order 5 every motion is first cut into segments with initial states of

@@ -41,13 +41,19 @@ class MonomialProgramme:
 
     @property
     def runs(self) -> tuple[tuple[int, int, int], ...]:
-        """(left, factor, count): count products that follow each other, of left, left + 1, ... and one variable."""
+        """(left, factor, count): count products that follow each other, of left, left + 1, ... and one variable.
+
+        All that a run reads lies before what it writes: powers of one variable, which a table may hold without the
+        others, are runs of their own.
+        """
         runs: list[tuple[int, int, int]] = []
-        for left, factor in self.products.tolist():
-            if runs and factor == runs[-1][1] and left == runs[-1][0] + runs[-1][2]:
+        first = self.n_var  # position of what the last run writes
+        for position, (left, factor) in enumerate(self.products.tolist(), self.n_var):
+            if runs and factor == runs[-1][1] and left == runs[-1][0] + runs[-1][2] and left < first:
                 runs[-1] = (runs[-1][0], factor, runs[-1][2] + 1)
             else:
                 runs.append((left, factor, 1))
+                first = position
         return tuple(runs)
 
 

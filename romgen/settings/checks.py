@@ -199,7 +199,7 @@ def _same_mix(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
 def _data_problems(data: DataSettings) -> Iterator[str]:
     for file in data.files:
         if not file.is_file():
-            yield f"[data] files: no such file; got '{file}'"
+            yield f"[data] files: no such file; got '{file}'; put it there, or name it relative to the study file"
     both = set(data.training) & set(data.validation)
     if both:
         yield f"[data] validation overlaps training; got {', '.join(map(str, sorted(both, key=str)))} in both"

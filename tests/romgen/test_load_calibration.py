@@ -82,15 +82,19 @@ def test_points_of_the_model_itself_return_its_load(known: ReducedModel, frequen
     assert load.points[0].model_m == pytest.approx(load.points[0].measured_m, rel=1e-6)
 
 
-def test_two_modes_with_their_relative_sign(known: ReducedModel) -> None:
-    """Between the modes both answer at once: 140 Hz tells that mid sees them in opposite phase."""
+@pytest.mark.parametrize(("level_between", "between_hz"), [(40.0, 145.0), (60.0, 160.0)])
+def test_two_modes_with_their_relative_sign(known: ReducedModel, level_between: float, between_hz: float) -> None:
+    """Between the modes both answer at once: lower and upper see them in opposite phase.
+
+    From 160 Hz the search with wrong signs ends at the right ones, which leaves no doubt about them either.
+    """
     truth = true_model(LOAD)
     points = [
         point(truth, level, hz, sensor)
         for level, hz, sensor in (
             (1.0, 109.9, "mid"),
-            (40.0, 145.0, "upper"),
-            (40.0, 145.0, "lower"),
+            (level_between, between_hz, "lower"),
+            (level_between, between_hz, "upper"),
             (1.0, 196.0, "upper"),
         )
     ]
@@ -182,6 +186,8 @@ def test_two_inputs_are_two_columns(known: ReducedModel) -> None:
     columns = [chart_input_matrix(known, load.modal_load[:, None])[:, 0] for load in forcing.loads]
     np.testing.assert_array_equal(model.input_matrix, np.column_stack(columns))
     np.testing.assert_allclose(forcing.loads[1].modal_load, np.array([0.9, -0.5]) / SHAPES[2], rtol=1e-12)
+    with pytest.raises(InputError, match="load inputs already; got base_acceleration, hammer; find all loads in one"):
+        forcing.applied(model)
 
 
 def test_notes_say_what_the_load_rests_on(known: ReducedModel) -> None:

@@ -60,6 +60,23 @@ def test_products_of_a_full_table_come_in_few_runs() -> None:
     assert position == programme.n_monomial
 
 
+@pytest.mark.parametrize(
+    "table", [np.array([[0, 1], [0, 5]]), np.array([[0, 0, 0, 1], [0, 0, 0, 7], [1, 0, 0, 2]]), exponents(4, 1, 5)[::3]]
+)
+def test_runs_of_a_sparse_table_read_nothing_that_they_write(table: np.ndarray) -> None:
+    """The runtime may compute all products of a run at once; powers of the last variable follow each other too."""
+    programme = monomial_programme(table)
+    x = np.random.default_rng(2).uniform(-1.5, 1.5, table.shape[1])
+    values = x
+    for left, factor, count in programme.runs:
+        read = values[left : left + count]
+        assert len(read) == count
+        values = np.concatenate([values, read * values[factor]])
+    position = [programme.index[tuple(row)] for row in table]
+    # At most 7 factors, each product rounds once.
+    np.testing.assert_allclose(values[position], monomials(x[None], table)[0], rtol=8 * np.finfo(float).eps)
+
+
 def test_a_full_table_needs_no_extra_monomials() -> None:
     table = exponents(4, 1, 7)
     assert monomial_programme(table).n_monomial == len(table)
