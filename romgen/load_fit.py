@@ -163,12 +163,18 @@ def _sigma(needed: Sequence[LoadAtAmplitude]) -> FloatArray:
 def _several(problem: LoadProblem, start: FloatArray, sigma: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the best f over all relative signs of the loads, and what is left open."""
     loaded = list(problem.loaded)
-    tried = []
+    tried, failures = [], list[InputError | NumericalError]()
     for signs in product((1.0, -1.0), repeat=len(loaded) - 1):
-        solution = least_squares(
-            lambda share: _residual(problem, start, share) / sigma, np.array((1.0, *signs)), diff_step=STEP
-        )
+        try:
+            solution = least_squares(
+                lambda share: _residual(problem, start, share) / sigma, np.array((1.0, *signs)), diff_step=STEP
+            )
+        except (InputError, NumericalError) as error:  # wrong signs may leave a point out of reach
+            failures.append(error)
+            continue
         tried.append((2.0 * float(solution.cost), solution.x))
+    if not tried:
+        raise failures[0]
     tried.sort(key=lambda one: one[0])
     f = start.copy()
     f[loaded] *= tried[0][1]

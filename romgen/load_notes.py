@@ -76,7 +76,7 @@ def _changes(model: ReducedModel, name: str, f: FloatArray) -> Iterator[str]:
         change = 100.0 * (float(np.abs(mean / column[j])) - 1.0)
         if abs(change) > CHANGED_PERCENT:
             yield (
-                f"by the chart of the model input {name} acts {change:+.1f} % stronger on mode {j + 1} at half its "
+                f"by the chart of the model input {name} acts {_changed(change)} on mode {j + 1} at half its "
                 "trained amplitude than at rest; the model keeps one value: forced amplitudes err by about as much"
             )
 
@@ -119,11 +119,15 @@ def _points(model: ReducedModel, fit: LoadFit) -> Iterator[str]:
             yield f"{point.name}: the model is not stable there, a sweep would jump; its frequency may be off"
         if abs(100.0 * at.input_change) > CHANGED_PERCENT:
             yield (
-                f"{point.name}: by the chart of the model the load acts here {100.0 * at.input_change:+.1f} % stronger "
+                f"{point.name}: by the chart of the model the load acts here {_changed(100.0 * at.input_change)} "
                 "than at rest; the model keeps one value, so the load holds near the amplitudes of the points"
             )
         if at.crossings > 1:
             yield f"{point.name}: the model shows this amplitude at {at.crossings} levels; the first from rest is taken"
+
+
+def _changed(percent: float) -> str:
+    return f"{abs(percent):.1f} % {'stronger' if percent > 0.0 else 'weaker'}"
 
 
 def _resonances(fit: LoadFit) -> Iterator[str]:

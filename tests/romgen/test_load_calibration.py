@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from romgen import load_fit
+from romgen.arrays import FloatArray
 from romgen.errors import InputError
 from romgen.forced_curve import ForcedCurve
 from romgen.forced_response import forced_response
@@ -110,6 +112,27 @@ def test_resonant_points_do_not_tell_the_relative_sign(known: ReducedModel) -> N
     # each mode alone answers at its resonance; the other one adds 1e-3
     np.testing.assert_allclose(np.abs(load.modal_load), np.abs(LOAD), rtol=1e-2)
     assert any("do not tell the relative signs" in note for note in load.notes)
+
+
+def test_signs_that_leave_a_point_out_of_reach_are_passed_over(
+    known: ReducedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And where no signs reach the points, the first failure is the answer."""
+    truth, residual = true_model(LOAD), load_fit._residual
+    points = [point(truth, 1.0, 109.9, "mid"), point(truth, 1.0, 196.0, "upper")]
+
+    def one_sided(problem: load_fit.LoadProblem, start: FloatArray, share: FloatArray) -> FloatArray:
+        if share[1] < limit:
+            raise InputError("out of reach", where="point 2")
+        return residual(problem, start, share)
+
+    monkeypatch.setattr(load_fit, "_residual", one_sided)
+    limit = 0.0
+    load = calibrated(known, *points, modes=(1, 2))
+    np.testing.assert_allclose(np.abs(load.modal_load), np.abs(LOAD), rtol=1e-2)
+    limit = np.inf
+    with pytest.raises(InputError, match="out of reach"):
+        calibrated(known, *points, modes=(1, 2))
 
 
 def test_sign_is_a_convention(known: ReducedModel) -> None:
