@@ -118,8 +118,8 @@ def learn(
         orders=orders,
         training=errors[: len(training)],
         validation=errors[len(training) :],
-        choice=choice_sentence(orders),
-        notes=learning_notes([*training, *validation], chart, model, errors),
+        choice=choice_sentence(orders, fit.origin),
+        notes=learning_notes([*training, *validation], chart, model, errors, fit.origin),
     )
 
 

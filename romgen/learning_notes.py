@@ -9,6 +9,7 @@ import numpy as np
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.chart import SensorChart
 from romgen.differences import is_uniform
+from romgen.normal_form import FitOrigin
 from romgen.order_selection import OrderTable
 from romgen.reduced_model import ReducedModel
 from romgen.trajectory import Trajectory
@@ -20,6 +21,12 @@ NOTED_REST_PERCENT = 1.0
 SAMPLES_PER_PERIOD = 7.0
 # Starts that the training motions nearly reach are not worth a note.
 NOTED_DISTANCE = 1.05
+_TIES = {
+    "given": "as given",
+    "small motions": "tied to the samples in which all modes are small",
+    "all amplitudes": "tied to a regression over all amplitudes",
+    "the direct fit": "tied to that of the direct fit",
+}
 
 
 def learning_notes(
@@ -27,6 +34,7 @@ def learning_notes(
     chart: SensorChart | None,
     model: ReducedModel,
     errors: Sequence[TrajectoryError],
+    origin: FitOrigin | None = None,
 ) -> tuple[str, ...]:
     """Return what was resampled, whether the model decays in its range, and which motions it cannot follow and why.
 
@@ -35,9 +43,11 @@ def learning_notes(
     trajectories : all, training first.
     chart : None with modal coordinates.
     errors : of the model on all trajectories.
+    origin : of a fit on trajectories.
     """
     return (
         *_chart_notes(trajectories, chart),
+        *_linear_part(origin),
         *_stability(model),
         *_divergences(model, errors),
         *_outside(model, errors),
@@ -64,15 +74,16 @@ def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) 
         yield f"{why}: {chart.delays} delays were used"
 
 
-def choice_sentence(orders: OrderTable) -> str:
-    """Return order and method of the normal form with the errors that decided."""
+def choice_sentence(orders: OrderTable, origin: FitOrigin | None = None) -> str:
+    """Return order and method of the normal form with the errors that decided, and where the fit came from."""
     rows = zip(orders.tried, orders.methods, orders.nmte_percent, orders.stable, strict=True)
     tried = ", ".join(
         f"order {order} on {method} {error:.3g} %" + ("" if stable else " (not stable in its range)")
         for order, method, error, stable in rows
     )
+    came = "" if origin is None else f" from {origin.start}, its linear part {_TIES[origin.linear]}"
     return (
-        f"normal form of order {orders.order} fitted on {orders.method}: "
+        f"normal form of order {orders.order} fitted on {orders.method}{came}: "
         f"mean NMTE of held-out blocks of the training data was {tried}"
     )
 
@@ -97,6 +108,14 @@ def _stability(model: ReducedModel) -> Iterator[str]:
             f"the model is not stable in its trained range: {100 * (1 - tried.share[0]):.0f} % of {tried.starts} free "
             "motions from the boundary of the range do not decay; add training motions in which several modes are "
             "large at once, or lower [learn] order"
+        )
+
+
+def _linear_part(origin: FitOrigin | None) -> Iterator[str]:
+    if origin is not None and origin.linear == "all amplitudes":
+        yield (
+            "the training motions end, or do not decay, before all modes are small together for 20 periods: frequency "
+            "and damping of small motions are extrapolated from larger ones; record longer ring-downs"
         )
 
 

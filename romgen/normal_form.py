@@ -31,6 +31,20 @@ Resonance = tuple[int, ...] | Literal["auto", "gap"]
 
 
 @dataclass(frozen=True)
+class FitOrigin:
+    """Where a fit on trajectories began and what its linear part is tied to.
+
+    Attributes
+    ----------
+    start : "band-passed signals" or "the direct fit".
+    linear : "small motions", "all amplitudes", "the direct fit", or "given" where it is kept.
+    """
+
+    start: str
+    linear: str
+
+
+@dataclass(frozen=True)
 class NormalFormFit:
     """A normal form with its coordinate changes over the scaled coordinates w = y / s.
 
@@ -45,6 +59,7 @@ class NormalFormFit:
     trained_range : amplitudes of the training motions.
     chart_error_percent : mean over samples of abs(w - Re(T zeta^E)) over the largest abs(w).
     replicates : coefficients without a block of the data each; None where they were not asked for.
+    origin : start of a fit on trajectories; None for others.
     """
 
     dynamics: ReducedDynamics
@@ -56,6 +71,7 @@ class NormalFormFit:
     trained_range: TrainedRange
     chart_error_percent: float
     replicates: Replicates | None = None
+    origin: FitOrigin | None = None
 
 
 def fit_normal_form(

@@ -89,7 +89,7 @@ def start_model(
     """
     reference = start.dynamics.eigenvalues
     if start.direct is None:
-        reference = small_eigenvalues(start, training, kept, table, keep_linear=keep_linear)
+        reference = small_eigenvalues(start, training, kept, table, keep_linear=keep_linear)[0]
     dynamics, m = start.dynamics, len(start.dynamics.eigenvalues)
     eigenvalues, B = rates(start, training, kept, table, keep_linear=keep_linear)
     # w = 2 Re(V q), so eta_j = s_j Re(2 V_jj z_j) and the rest
@@ -128,12 +128,12 @@ def small_eigenvalues(
     table: ResonanceTable,
     *,
     keep_linear: bool,
-) -> ComplexArray:
-    """Return Lambda (m,) by the regression of ``rates`` over the samples in which all modes are small.
+) -> tuple[ComplexArray, bool]:
+    """Return Lambda (m,) by the regression of ``rates`` over the samples in which all modes are small, and True.
 
     Over all amplitudes the linear part of a polynomial of low degree bends towards the large ones. Band-passed signals
     have no rest position in them, which counts where motions are small. Motions that end before SMALL_PERIODS, or that
-    do not decay there, leave the regression over all samples.
+    do not decay there, leave the regression over all samples, and False.
     """
     Z, Z_dot = _samples(start, training, kept)
     small = (np.abs(Z) <= SMALL * np.abs(Z).max(axis=0)).all(axis=1)
@@ -141,8 +141,8 @@ def small_eigenvalues(
     if small.sum() * min(float(r.t[1] - r.t[0]) for r in training) >= SMALL_PERIODS * slowest:
         eigenvalues = _regression(start, (Z[small], Z_dot[small]), table, keep_linear=keep_linear)[0]
         if np.all(eigenvalues.real < 0.0):
-            return eigenvalues
-    return _regression(start, (Z, Z_dot), table, keep_linear=keep_linear)[0]
+            return eigenvalues, True
+    return _regression(start, (Z, Z_dot), table, keep_linear=keep_linear)[0], False
 
 
 def _regression(

@@ -12,7 +12,7 @@ from romgen.chart import ReducedTrajectory
 from romgen.differences import is_uniform
 from romgen.dissipative_fit import dissipative
 from romgen.jackknife import Replicates, blocks_of
-from romgen.normal_form import NormalFormFit, Resonance, fit_normal_form, resonance_table, with_replicates
+from romgen.normal_form import FitOrigin, NormalFormFit, Resonance, fit_normal_form, resonance_table, with_replicates
 from romgen.reduced_dynamics import LinearPart
 from romgen.refined_chart import refined_normal_form
 from romgen.refined_dynamics import RefinedDynamics, Segment
@@ -72,7 +72,8 @@ def fit_on_trajectories(
     references = _references(training, last.start, table, (ridge, known is not None))
     others = replicates(last.model, last.segments, last.max_step, references)
     spread = Replicates(np.array([o.eigenvalues for o in others]), np.array([o.B for o in others]))
-    return replace(last.normal_form(ridge), replicates=spread)
+    origin = _origin(training, last.start, table, keep_linear=known is not None)
+    return replace(last.normal_form(ridge), replicates=spread, origin=origin)
 
 
 def growing_orders(order: int) -> list[int]:
@@ -204,4 +205,15 @@ def _references(
     block = blocks_of(training)
     ends = np.cumsum([len(r.t) for r in training])[:-1]
     kept = [np.split(block != b, ends) for b in range(block.max() + 1)]
-    return np.array([small_eigenvalues(start, training, masks, table, keep_linear=keep_linear) for masks in kept])
+    return np.array([small_eigenvalues(start, training, masks, table, keep_linear=keep_linear)[0] for masks in kept])
+
+
+def _origin(
+    training: Sequence[ReducedTrajectory], start: Start, table: ResonanceTable, *, keep_linear: bool
+) -> FitOrigin:
+    if start.direct is not None:
+        return FitOrigin("the direct fit", "given" if keep_linear else "the direct fit")
+    everything = [np.ones(len(r.t), dtype=bool) for r in training]
+    small = small_eigenvalues(start, training, everything, table, keep_linear=keep_linear)[1]
+    linear = "small motions" if small else "all amplitudes"
+    return FitOrigin("band-passed signals", "given" if keep_linear else linear)

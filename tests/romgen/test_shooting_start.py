@@ -10,10 +10,12 @@ from romgen.arrays import ComplexArray, FloatArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import first_derivative
 from romgen.etdrk4 import march
-from romgen.normal_form import fit_normal_form, resonance_table
+from romgen.learning_notes import learning_notes
+from romgen.normal_form import FitOrigin, fit_normal_form, resonance_table
 from romgen.order_selection import motion_error
 from romgen.shooting_start import band_passed, rates, small_eigenvalues
 from romgen.trajectory_fit import fit_on_trajectories
+from tests.romgen.fmu.models import random_model
 
 LAMBDA = np.array([-0.5 + 60.0j, -0.8 + 121.0j])
 STEP = 0.002
@@ -69,8 +71,23 @@ def test_small_motions_give_the_linear_part_that_a_polynomial_over_all_amplitude
     kept = [np.ones(len(r.t), dtype=bool)]
     start = band_passed(fit_normal_form([r], 3, (1, 2), 1e-8).dynamics, [r])
     table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
-    small = small_eigenvalues(start, [r], kept, table, keep_linear=False)
+    small, is_small = small_eigenvalues(start, [r], kept, table, keep_linear=False)
     everything = rates(start, [r], kept, table, keep_linear=False)[0]
+    assert is_small
     assert 60.0 - 8.0 * np.sqrt(0.06) < small[0].imag < 60.0
     assert abs(small[0].imag - 60.0) < 1.5 * np.sqrt(0.15) * abs(everything[0].imag - 60.0)
     assert small[0].real == pytest.approx(-0.9, rel=0.05)
+
+
+def test_motions_that_end_while_they_are_large_tie_the_linear_part_to_all_amplitudes() -> None:
+    """After 1.5 s mode 1 is at a quarter of its start, not below 0.15."""
+    t = STEP * np.arange(751)
+    r = motion(np.exp(np.outer(t, [-0.9 + 60.0j, -1.5 + 121.0j])) * [0.4, 0.3], np.zeros(2))
+    kept = [np.ones(len(r.t), dtype=bool)]
+    start = band_passed(fit_normal_form([r], 3, (1, 2), 1e-8).dynamics, [r])
+    table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
+    found, is_small = small_eigenvalues(start, [r], kept, table, keep_linear=False)
+    assert not is_small
+    assert np.array_equal(found, rates(start, [r], kept, table, keep_linear=False)[0])
+    notes = learning_notes([], None, random_model(), [], FitOrigin("band-passed signals", "all amplitudes"))
+    assert "record longer ring-downs" in notes[0]
