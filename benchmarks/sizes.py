@@ -24,6 +24,7 @@ from fem.campaign import Starts, modal_coordinates, snap_back_starts
 from fem.compiled import threaded
 from fem.model import Model
 from fem.modes import ModalBasis, rayleigh, solve_modes
+from fem.motion import MotionState
 from fem.preload import StaticSettings, solve_static
 from fem.transient import Transient, TransientSettings
 from romgen.fe_stages import build
@@ -115,6 +116,16 @@ def parts(transient: Transient, modes: ModalBasis, u: FloatArray, slip: FloatArr
     }
 
 
+def settling(transient: Transient, old: MotionState, new: MotionState) -> float:
+    """Median ms in which the loose points come into equilibrium, from one state to the next."""
+    loose = transient.loose(new)
+    if loose is None:
+        return 0.0
+    slip = np.ascontiguousarray(old.slip[loose.index])
+    v, applied = loose.gap(new.u), loose.remainder(loose.gap(old.u), slip)
+    return median_ms(lambda: loose.settled(v, applied, slip))
+
+
 def march(name: str, ready: Ready, starts: Starts, speed: float) -> None:
     """Print parts and steps of the cases of ``starts``; ``speed`` of memory in bytes per second."""
     transient, modes = ready
@@ -123,9 +134,12 @@ def march(name: str, ready: Ready, starts: Starts, speed: float) -> None:
     for part, ms in parts(transient, modes, state.u, state.slip).items():
         print(f"  {part + f' ({n_case})':<28}{ms:>10.2f} ms", flush=True)
     times, iterations, begin = [], [], time.perf_counter()
+    states = [state, state]
     for record in transient.march(state, STEPS[n_case]):
         times.append(time.perf_counter())
         iterations.append(float(record.iterations.max()))
+        states = [states[1], record.state]
+    print(f"  {f'{len(states[1].pace.loose)} loose points ({n_case})':<28}{settling(transient, *states):>10.2f} ms")
     steps = np.diff([begin, *times])
     median, mean = statistics.median(steps), statistics.mean(iterations)
     factor = 8.0 * transient.statistics.factor_entries  # two sweeps in single precision

@@ -6,7 +6,7 @@ factored in every iteration, is the reference that the first is tested against.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields
 from typing import Any
 
@@ -18,6 +18,7 @@ from fem.anderson import Anderson
 from fem.arrays import FloatArray, IntArray
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError
+from fem.interface_equilibrium import LoosePoints
 from fem.linear_solver import make_solver
 from fem.motion import SolvedStep
 from fem.step_equation import StepEquation, StepProblem, Trial
@@ -25,6 +26,8 @@ from fem.viscous_tangent import viscous_stiffness
 
 DIVERGED = 1e12
 """Residual over the peak inertia force beyond which iterating on is pointless and overflows single precision."""
+
+_Pair = tuple[FloatArray, FloatArray]
 
 ADVICE = "use a smaller time step, a smaller amplitude, or a start that has settled (snap-back)"
 
@@ -63,14 +66,16 @@ class Corrector:
         problem: StepProblem,
         solve: Callable[[FloatArray, IntArray], FloatArray],
         anderson: Anderson,
+        loose: LoosePoints | None = None,
     ) -> SolvedStep:
         """Anderson-accelerated iteration on all cases together; each leaves when it has converged.
 
-        ``solve`` preconditions residuals (n_dof, n_live) of the cases (n_live,).
+        ``solve`` preconditions residuals (n_dof, n_live) of the cases (n_live,). The remainders of the ``loose`` points
+        are unknowns beside the acceleration: mixed with the same weights, they stay those that it was made with.
         """
         a, live = problem.guess, np.arange(problem.guess.shape[1])
-        anderson.forget()
-        step = previous = None
+        phi = _remainder(equation, problem, loose, a)
+        mixing = _Mixing(anderson, len(phi))
         history: list[float] = []
         found: list[tuple[IntArray, SolvedStep]] = []
         for iteration in range(self.max_iterations):
@@ -89,15 +94,19 @@ class Corrector:
             if not active.all():
                 kept = np.flatnonzero(active)
                 problem, live = problem.cases(kept), live[kept]
-                a, residual = (np.ascontiguousarray(x[:, kept]) for x in (a, residual))
-                if step is not None and previous is not None:
-                    step, previous = (np.ascontiguousarray(x[:, kept]) for x in (step, previous))
+                a, residual, phi = _columns((a, residual, phi), kept)
+                mixing.keep(kept)
+            if loose is None or iteration == 0:
+                aim = phi
+            else:
+                aim, force = _settled(equation, problem, loose, a, phi)
+                residual = residual + force
             correction = -solve(residual, live) * equation.dynamics.mask
-            if step is not None and previous is not None:
-                anderson.remember(live, step, correction - previous)
-            step = anderson.step(live, correction)
-            previous = correction
-            a = a + step
+            # The first correction of loose points only tells what remainders the second one starts from.
+            if loose is None or iteration > 0:
+                correction, moved = mixing.step(live, (correction, aim - phi))
+                phi = phi + moved
+            a = a + correction
         raise self.failure(problem, history)
 
     def newton(self, equation: StepEquation, problem: StepProblem, solver: str) -> SolvedStep:
@@ -118,6 +127,57 @@ class Corrector:
                 break
             a = a - _newton_step(equation, problem, a, trial, solver) * equation.dynamics.mask
         raise self.failure(problem, history)
+
+
+class _Mixing:
+    """Anderson's steps from the corrections of one time step, each in two parts: accelerations and remainders."""
+
+    def __init__(self, anderson: Anderson, n_carried: int) -> None:
+        anderson.forget(n_carried)
+        self._anderson = anderson
+        self._last: tuple[_Pair, _Pair] | None = None
+
+    def step(self, live: IntArray, change: _Pair) -> _Pair:
+        """The step of the cases (n_live,) from their correction."""
+        if self._last is not None:
+            step, before = self._last
+            self._anderson.remember(live, step[0], change[0] - before[0], (step[1], change[1] - before[1]))
+        mixed = self._anderson.step(live, change[0]), self._anderson.carried_step(live, change[1])
+        self._last = mixed, change
+        return mixed
+
+    def keep(self, kept: IntArray) -> None:
+        """Go on with the columns ``kept`` alone."""
+        if self._last is not None:
+            (step, moved), (change, aim) = self._last
+            step, moved, change, aim = _columns((step, moved, change, aim), kept)
+            self._last = (step, moved), (change, aim)
+
+
+def _columns(arrays: Iterable[FloatArray], kept: IntArray) -> Iterator[FloatArray]:
+    return (np.ascontiguousarray(x[:, kept]) for x in arrays)
+
+
+def _relative(
+    equation: StepEquation, problem: StepProblem, loose: LoosePoints, a: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Relative displacements (3 n, n_case) m of the loose points at a, and their slip history (n, 2, n_case) m."""
+    v = loose.gap(problem.u0) + equation.step**2 * equation.scheme.beta * loose.gap(a)
+    return v, np.ascontiguousarray(problem.slip[loose.index])
+
+
+def _remainder(equation: StepEquation, problem: StepProblem, loose: LoosePoints | None, a: FloatArray) -> FloatArray:
+    """Remainder (3 n, n_case) Pa of the loose points at a; no rows without such points."""
+    return np.empty((0, a.shape[1])) if loose is None else loose.remainder(*_relative(equation, problem, loose, a))
+
+
+def _settled(
+    equation: StepEquation, problem: StepProblem, loose: LoosePoints, a: FloatArray, phi: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Remainder at the equilibrium of the loose points, and what it adds to the residual at a (n_dof, n_case) N."""
+    v, slip = _relative(equation, problem, loose, a)
+    aim = loose.settled(v, phi, slip)
+    return aim, (1.0 - equation.scheme.alpha_f) * loose.force(aim - loose.remainder(v, slip))
 
 
 def _newton_step(equation: StepEquation, problem: StepProblem, a: FloatArray, trial: Trial, solver: str) -> FloatArray:

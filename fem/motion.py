@@ -26,6 +26,7 @@ class Pace:
     before : (n_case,) iterations of the step for which it got it.
     anchored : (n_anchor,) cases with a factor of their own; anchor_u (n_dof, n_anchor) m and anchor_slip (n_point, 2,
         n_anchor) m: where their tangents were taken.
+    loose : (n_loose,) contact points whose equilibrium is found apart, see ``interface_equilibrium``.
     """
 
     position: float
@@ -40,6 +41,7 @@ class Pace:
     anchored: IntArray
     anchor_u: FloatArray
     anchor_slip: FloatArray
+    loose: IntArray
 
     @staticmethod
     def beginning(u: FloatArray, slip: FloatArray, peak: FloatArray, force: FloatArray) -> Pace:
@@ -47,7 +49,8 @@ class Pace:
         zero = np.zeros(u.shape[1], dtype=np.int64)
         none = zero[:0]
         still = np.zeros_like(u)
-        return Pace(0.0, 0, 0, still, peak, force, zero, zero, zero, none, u[:, :0].copy(), slip[:, :, :0].copy())
+        anchors = none, u[:, :0].copy(), slip[:, :, :0].copy()
+        return Pace(0.0, 0, 0, still, peak, force, zero, zero, zero, *anchors, none)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from fem.arrays import FloatArray, IntArray
 from fem.corotation import NodalRotation, rotate
+from fem.interface_equilibrium import LoosePoints, loose_points
 from fem.linear_solver import LinearSolver, make_solver
 from fem.modes import ModalBasis
 from fem.motion import Pace
@@ -52,6 +53,7 @@ class Preconditioner:
         self._rest = _Rest(modes.stiffness + contact, viscous)
         self._rotation = NodalRotation(model)
         self._factors: dict[_Key, LinearSolver] = {}
+        self._loose: LoosePoints | None = None
         self.built = 0
 
     def rest(self, level: int) -> LinearSolver:
@@ -59,6 +61,19 @@ class Preconditioner:
         return self._factor(
             (level, b""), lambda: self._equations(level).matrix(self._rest.stiffness, self._rest.viscous)
         )
+
+    def loose(self, index: IntArray) -> LoosePoints | None:
+        """The contact points ``index`` on the shared factor for whole output intervals; None for none."""
+        if not len(index):
+            return None
+        if self._loose is None or not np.array_equal(self._loose.index, index):
+            equation, dynamics = self._equations(0), self._dynamics
+            factor, mask, s = self.rest(0), dynamics.mask, equation.scheme
+            share = (1.0 - s.alpha_f) * equation.step**2 * s.beta
+            closed = dynamics.equilibrium.contact.status[:, 0] > 0
+            contact = dynamics.model.contact
+            self._loose = loose_points(contact, closed, index, lambda f: share * mask * factor.solve(mask * f))
+        return self._loose
 
     def prepare(self, level: int, pace: Pace, u: FloatArray) -> Solve:
         """(r, live) -> A^-1 r for r (n_dof, n_live) of the cases (n_live,), for a step to about u (n_dof, n_case)."""

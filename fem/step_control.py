@@ -10,6 +10,7 @@ from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError
 from fem.generalized_alpha import Scheme
+from fem.interface_equilibrium import loosened
 from fem.motion import MotionState, Pace, StepRecord
 from fem.step_equation import StepEquation
 
@@ -35,6 +36,7 @@ class StepControl:
     finest : most halvings of the output interval; coarsest : fewest, negative for steps of several intervals.
     error_tolerance : local error of a step in the mass norm of u over the largest displacement so far; None: fixed.
     max_iterations : of a step. refactor_above : iterations above which a case gets a factor of its own; 0: never.
+    apart : points that slip or open are taken for the equilibrium of their own.
     """
 
     finest: int
@@ -42,6 +44,7 @@ class StepControl:
     error_tolerance: float | None
     max_iterations: int
     refactor_above: int
+    apart: bool
 
     def error(self, equation: StepEquation, old: MotionState, record: StepRecord) -> float:
         """Largest local error over its tolerance of all cases; 0 where steps are fixed.
@@ -80,11 +83,18 @@ class StepControl:
             peak=peak,
             force=np.maximum(old.pace.force, dynamics.norm(new.inertia_a)),
             waited=old.pace.waited + 1,
+            loose=self._loose(dynamics, old.pace.loose, record),
         )
         pace, count = self._refreshed(pace, iterations, new.u, old.slip)
         state = replace(new, step=int(np.floor(position)), pace=pace)
         effort = replace(record.effort, factors=record.effort.factors + count)
         return replace(record, state=state, resume=state, effort=effort)
+
+    def _loose(self, dynamics: Dynamics, index: IntArray, record: StepRecord) -> IntArray:
+        if not self.apart:
+            return index
+        closed = dynamics.equilibrium.contact.status[:, 0] > 0
+        return loosened(index, dynamics.model.contact, record.contact, closed)
 
     def _refreshed(self, pace: Pace, iterations: IntArray, u: FloatArray, slip: FloatArray) -> tuple[Pace, int]:
         """The pace with new factors for slow cases, without those that did not pay, and the number of new ones.

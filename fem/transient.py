@@ -19,6 +19,7 @@ from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError, FemInputError
 from fem.excitation import Amplitude, SupportMotion, TimeLoad, base_load
 from fem.generalized_alpha import Scheme
+from fem.interface_equilibrium import LoosePoints
 from fem.linear_solver import SolverStatistics
 from fem.model import Model
 from fem.modes import ModalBasis, Rayleigh
@@ -50,6 +51,8 @@ class TransientSettings:
     method : "anderson" on a frozen factor, or "newton" with the consistent tangent factored in every iteration.
     refactor_above : iterations of a step above which a case gets a factor of its current tangent; 0: never. Each such
         case keeps a factor of its own in memory.
+    interface_equilibrium : find the equilibrium of the contact points that slip or open apart in every iteration,
+        see ``interface_equilibrium``; fewer iterations to the same residual.
     max_cutbacks : most halvings of ``time_step``, for convergence or for the local error.
     error_tolerance : local error of a step in the mass norm of the displacement, relative to the largest so far; None:
         fixed steps.
@@ -67,6 +70,7 @@ class TransientSettings:
     solver: str = "auto"
     method: str = "anderson"
     refactor_above: int = 15
+    interface_equilibrium: bool = True
     max_cutbacks: int = 6
     error_tolerance: float | None = None
     max_doublings: int = 0
@@ -123,6 +127,7 @@ class Transient:
             settings.error_tolerance,
             settings.max_iterations,
             settings.refactor_above if settings.method == "anderson" else 0,
+            settings.method == "anderson" and settings.interface_equilibrium,
         )
         self._preconditioner = Preconditioner(self._equation, modes, settings.solver)
         if settings.method == "anderson":
@@ -189,6 +194,10 @@ class Transient:
         """Acceleration correction A^-1 r of the frozen factor, (n_dof, n_case) from forces (n_dof, n_case)."""
         return self._preconditioner.rest(0).solve(residual)
 
+    def loose(self, state: MotionState) -> LoosePoints | None:
+        """The contact points of a state that come into equilibrium apart, on the factor that all cases share."""
+        return self._preconditioner.loose(state.pace.loose)
+
     def _modal_inertia(self, modes: ModalBasis) -> tuple[FloatArray, FloatArray]:
         """Left vectors M phi_j and the relative inertia by which each corrected mode differs, (n_dof, k) and (k,).
 
@@ -249,7 +258,10 @@ class Transient:
             return self._corrector.newton(equation, problem, self.settings.solver)
         u = problem.u0 + equation.step**2 * self.scheme.beta * problem.guess
         solve = self._preconditioner.prepare(level, old.pace, u)
-        return self._corrector.accelerated(equation, problem, solve, anderson)
+        # The compliance of the points belongs to the shared factor for whole intervals.
+        shared = level == 0 and not len(old.pace.anchored)
+        loose = self.loose(old) if shared else None
+        return self._corrector.accelerated(equation, problem, solve, anderson, loose)
 
     def _between(self, state: MotionState, new: MotionState, level: int, number: int) -> StepRecord:
         """The output inside a step of several intervals, and where the march resumes: before that step."""

@@ -179,7 +179,7 @@ def test_error_estimate_is_the_local_error(beam: Linear, rho: float) -> None:
     At rho = 1 the start itself is exact in a, elsewhere rho^20 of its shift is left.
     """
     transient = of_beam(beam, 200.0, rho, error_tolerance=1e6)
-    control, omega = StepControl(0, 0, 1.0, 60, 0), float(beam[2].omega[0])
+    control, omega = StepControl(0, 0, 1.0, 60, 0, apart=False), float(beam[2].omega[0])
     h = transient.settings.time_step
     estimates, errors, old = [], [], plucked(beam, transient)
     for record in transient.march(old, 150):
