@@ -29,7 +29,7 @@ COMPILE = ("-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 
 LINK = ("-s", "-shared")
 
-FAST_FILES = ("rom_etdrk4.c", "rom_kernel.c")
+FAST_FILES = ("rom_etdrk4.c", "rom_kernel.c", "rom_rows.c")
 """Files in which steps spend their time are compiled for speed, the others for size."""
 
 NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
