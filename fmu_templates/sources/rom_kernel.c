@@ -25,33 +25,36 @@ static double modulus(rom_complex a)
     return sqrt(a.re * a.re + a.im * a.im);
 }
 
-/* Monomials without pairs of (z, conj z). Sizes that may be 0 come as arguments: compilers object to loops over a constant 0. */
-static void base_monomials(const rom_complex z[], size_t n_product, rom_complex p[])
+static void with_conjugate(rom_complex a, rom_complex p[2])
 {
-    rom_complex *next = p + 1 + N_REDUCED;
-    p[0].re = 1.0;
-    p[0].im = 0.0;
-    for (size_t j = 0; j < N_MODE; ++j) {
-        const rom_complex conjugate = {z[j].re, -z[j].im};
-        p[1 + j] = z[j];
-        p[1 + N_MODE + j] = conjugate;
-    }
-    for (size_t k = 0; k < n_product; ++k)
-        *next++ = multiply(p[base_product[k].left], p[base_product[k].right]);
+    const rom_complex conjugate = {a.re, -a.im};
+    p[0] = a;
+    p[1] = conjugate;
 }
 
-static void base_tangents(const rom_complex p[], const rom_complex dz[], size_t n_product, rom_complex dp[])
+/* 1, z and products, each followed by its conjugate. Sizes that may be 0 come as arguments: compilers object to loops over
+   a constant 0. */
+static void base_monomials(const rom_complex z[], size_t n_product, rom_complex p[])
 {
-    rom_complex *next = dp + 1 + N_REDUCED;
-    dp[0].re = dp[0].im = 0.0;
-    for (size_t j = 0; j < N_MODE; ++j) {
-        const rom_complex conjugate = {dz[j].re, -dz[j].im};
-        dp[1 + j] = dz[j];
-        dp[1 + N_MODE + j] = conjugate;
-    }
-    for (size_t k = 0; k < n_product; ++k) {
+    const rom_complex one = {1.0, 0.0};
+    rom_complex *next = p + 2 + N_REDUCED;
+    p[0] = p[1] = one;
+    for (size_t j = 0; j < N_MODE; ++j)
+        with_conjugate(z[j], p + 2 + 2 * j);
+    for (size_t k = 0; k < n_product; ++k, next += 2)
+        with_conjugate(multiply(p[base_product[k].left], p[base_product[k].right]), next);
+}
+
+ROM_SMALL static void base_tangents(const rom_complex p[], const rom_complex dz[], size_t n_product, rom_complex dp[])
+{
+    const rom_complex zero = {0.0, 0.0};
+    rom_complex *next = dp + 2 + N_REDUCED;
+    dp[0] = dp[1] = zero;
+    for (size_t j = 0; j < N_MODE; ++j)
+        with_conjugate(dz[j], dp + 2 + 2 * j);
+    for (size_t k = 0; k < n_product; ++k, next += 2) {
         const size_t a = base_product[k].left, b = base_product[k].right;
-        *next++ = add(multiply(dp[a], p[b]), multiply(p[a], dp[b]));
+        with_conjugate(add(multiply(dp[a], p[b]), multiply(p[a], dp[b])), next);
     }
 }
 
@@ -68,7 +71,7 @@ static void pair_monomials(const rom_pair x[], size_t n_product, rom_pair p[])
     }
 }
 
-static void pair_tangents(const rom_pair p[], const rom_pair dx[], size_t n_product, rom_pair dp[])
+ROM_SMALL static void pair_tangents(const rom_pair p[], const rom_pair dx[], size_t n_product, rom_pair dp[])
 {
     rom_pair *next = dp + 1 + N_MODE;
     dp[0].left = dp[0].right = 0.0;
@@ -107,7 +110,7 @@ static void squares(const rom_complex z[], rom_pair p[])
     pair_monomials(square, N_FORM_PRODUCT, p);
 }
 
-static void squares_tangent(const rom_complex z[], const rom_complex dz[], const rom_pair p[], rom_pair dp[])
+ROM_SMALL static void squares_tangent(const rom_complex z[], const rom_complex dz[], const rom_pair p[], rom_pair dp[])
 {
     rom_pair change[N_MODE];
     for (size_t j = 0; j < N_MODE; ++j)
@@ -151,14 +154,14 @@ void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *
     add_normal_form(&w->tables, w->base, w->square, rate);
 }
 
-void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
+ROM_SMALL void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
 {
     rom_nonlinear_rate(z, u, w, rate);
     for (size_t j = 0; j < N_MODE; ++j)
         rate[j] = add(rate[j], multiply(eigenvalue[j], z[j]));
 }
 
-void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
+ROM_SMALL void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
                       rom_complex drate[])
 {
     base_monomials(z, N_BASE_PRODUCT, w->base);
@@ -189,7 +192,7 @@ void rom_sensors(const rom_workspace *w, size_t kind, double x[])
 }
 
 /* d(left right) = d left right + left d right */
-static void rows_tangent(const double C[], size_t n_row, const rom_blocks *blocks, const rom_pair p[], const rom_pair dp[],
+ROM_SMALL static void rows_tangent(const double C[], size_t n_row, const rom_blocks *blocks, const rom_pair p[], const rom_pair dp[],
                          int wide, double dx[])
 {
     double second[N_SENSOR > N_REDUCED ? N_SENSOR : N_REDUCED];
@@ -199,7 +202,7 @@ static void rows_tangent(const double C[], size_t n_row, const rom_blocks *block
         dx[i] += second[i];
 }
 
-void rom_amplitudes(const rom_complex z[], rom_output *out)
+ROM_SMALL void rom_amplitudes(const rom_complex z[], rom_output *out)
 {
     for (size_t j = 0; j < N_MODE; ++j) {
         out->amplitude[j] = modulus(z[j]);
@@ -218,7 +221,7 @@ static double facet_value(size_t k, const double r[])
 }
 
 /* d|z_j| = Re(conj z_j dz_j) / |z_j|, d arg z_j = Im(conj z_j dz_j) / |z_j|^2, both taken as 0 at rest; the trust ratio follows the facet that leads it */
-static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
+ROM_SMALL static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
 {
     double r[N_MODE], leading = -1.0;
     for (size_t j = 0; j < N_MODE; ++j) {
@@ -235,7 +238,7 @@ static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], ro
     }
 }
 
-void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout)
+ROM_SMALL void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout)
 {
     rom_pair dx[N_MODE];
     double dy[N_REDUCED];

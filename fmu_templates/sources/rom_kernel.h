@@ -17,7 +17,7 @@
 
 #define N_HALF_MONOMIAL (1 + N_MODE + N_HALF_PRODUCT)
 #define N_HALF_PADDED ((N_HALF_MONOMIAL + N_LANE - 1) / N_LANE * N_LANE)
-#define N_BASE_MONOMIAL (1 + N_REDUCED + N_BASE_PRODUCT)
+#define N_BASE_MONOMIAL (2 * (1 + N_MODE + N_BASE_PRODUCT)) /* each followed by its conjugate */
 
 #define N_BASE_MOTION (ABSOLUTE_OUTPUTS ? 2 : 0) /* displacement and velocity of the base, inputs */
 #define N_ABSOLUTE (ABSOLUTE_OUTPUTS ? N_SENSOR_ROW : 0)

@@ -1,5 +1,7 @@
 #include "rom_rows.h"
 
+#include <string.h>
+
 /* GCC for Windows may put AVX registers where its stack is not aligned for them (its bug 54412). */
 #if defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32)))
 #define WITH_AVX 1
@@ -14,49 +16,93 @@
 #define INLINE static inline
 #endif
 
-/* The N_LANE parts of n_row rows, a constant number, so that all sums can stay in registers. Even and odd left monomials
-   are summed apart: an addition need not wait for the one before. */
-INLINE void parts_of(const double *C, size_t n_row, const rom_blocks *blocks, const rom_pair *left, const rom_pair *right,
-                     double part[N_GROUP][N_LANE])
+#if defined(__GNUC__)
+
+typedef double lanes __attribute__((vector_size(N_LANE * sizeof(double)), aligned(8), may_alias));
+
+/* sum += factor c */
+INLINE void add_multiple(lanes *sum, double factor, const double c[])
 {
-    double total[N_GROUP][N_LANE] = {{0.0}};
-    for (size_t b = 0; b < blocks->n_block; ++b, right += N_LANE) {
-        double even[N_GROUP][N_LANE] = {{0.0}}, odd[N_GROUP][N_LANE] = {{0.0}};
-        for (const rom_pair *a = left, *end = left + blocks->count[b]; a < end; a += 2, C += 2 * n_row * N_LANE)
-            for (size_t i = 0; i < n_row; ++i)
-                for (size_t e = 0; e < N_LANE; ++e) {
-                    even[i][e] += C[i * N_LANE + e] * a[0].left;
-                    odd[i][e] += C[(n_row + i) * N_LANE + e] * a[1].left;
-                }
-        for (size_t i = 0; i < n_row; ++i)
-            for (size_t e = 0; e < N_LANE; ++e)
-                total[i][e] += (even[i][e] + odd[i][e]) * right[e].right;
-    }
-    for (size_t i = 0; i < n_row; ++i)
-        for (size_t e = 0; e < N_LANE; ++e)
-            part[i][e] = total[i][e];
+    *sum += factor * *(const lanes *)c;
 }
+
+/* sum += (a + b) c */
+INLINE void add_product(lanes *sum, const lanes *a, const lanes *b, const double c[])
+{
+    *sum += (*a + *b) * *(const lanes *)c;
+}
+
+#else
+
+typedef struct {
+    double e[N_LANE];
+} lanes;
+
+INLINE void add_multiple(lanes *sum, double factor, const double c[])
+{
+    for (size_t e = 0; e < N_LANE; ++e)
+        sum->e[e] += factor * c[e];
+}
+
+INLINE void add_product(lanes *sum, const lanes *a, const lanes *b, const double c[])
+{
+    for (size_t e = 0; e < N_LANE; ++e)
+        sum->e[e] += (a->e[e] + b->e[e]) * c[e];
+}
+
+#endif
+
+/* The N_LANE parts of n_row rows of a group of n_all; a constant number, so that all sums can stay in registers. Even and odd
+   left monomials are summed apart: an addition need not wait for the one before. */
+INLINE void parts_of(const double *C, size_t n_row, size_t n_all, const rom_blocks *blocks, const rom_pair *left,
+                     const rom_pair *right, double part[][N_LANE])
+{
+    const lanes zero[N_GROUP] = {{0.0}};
+    lanes total[N_GROUP];
+    memcpy(total, zero, sizeof total);
+    for (size_t b = 0; b < blocks->n_block; ++b, right += N_LANE) {
+        lanes even[N_GROUP], odd[N_GROUP];
+        double last[N_LANE];
+        memcpy(even, zero, sizeof even);
+        memcpy(odd, zero, sizeof odd);
+        for (const rom_pair *a = left, *end = left + blocks->count[b]; a < end; a += 2, C += 2 * n_all * N_LANE)
+            for (size_t i = 0; i < n_row; ++i) {
+                add_multiple(&even[i], a[0].left, C + i * N_LANE);
+                add_multiple(&odd[i], a[1].left, C + (n_all + i) * N_LANE);
+            }
+        for (size_t e = 0; e < N_LANE; ++e)
+            last[e] = right[e].right;
+        for (size_t i = 0; i < n_row; ++i)
+            add_product(&total[i], &even[i], &odd[i], last);
+    }
+    memcpy(part, total, n_row * sizeof *total);
+}
+
+/* Whether maps of this model leave n rows to a group */
+#define LEAVES(n) (2 * N_MODE % N_GROUP == (n) || N_SENSOR % N_GROUP == (n))
 
 INLINE void group(const double *C, size_t n_row, const rom_blocks *blocks, const rom_pair *left, const rom_pair *right,
                   double part[N_GROUP][N_LANE])
 {
-    if (n_row == 4)
-        parts_of(C, 4, blocks, left, right, part);
-    else if (n_row == 3)
-        parts_of(C, 3, blocks, left, right, part);
-    else if (n_row == 2)
-        parts_of(C, 2, blocks, left, right, part);
-    else
-        parts_of(C, 1, blocks, left, right, part);
-}
-
-static void plain_group(const double *C, size_t n_row, const rom_blocks *blocks, const rom_pair *left, const rom_pair *right,
-                        double part[N_GROUP][N_LANE])
-{
-    group(C, n_row, blocks, left, right, part);
+    if (n_row == N_GROUP)
+        parts_of(C, N_GROUP, N_GROUP, blocks, left, right, part);
+    else if (LEAVES(3) && n_row == 3)
+        parts_of(C, 3, 3, blocks, left, right, part);
+    else if (LEAVES(2) && n_row == 2)
+        parts_of(C, 2, 2, blocks, left, right, part);
+    else if (LEAVES(1))
+        parts_of(C, 1, 1, blocks, left, right, part);
 }
 
 #if WITH_AVX
+
+/* Row by row: few processors still come here, and it takes little code */
+static void plain_group(const double *C, size_t n_row, const rom_blocks *blocks, const rom_pair *left, const rom_pair *right,
+                        double part[N_GROUP][N_LANE])
+{
+    for (size_t i = 0; i < n_row; ++i)
+        parts_of(C + i * N_LANE, 1, n_row, blocks, left, right, part + i);
+}
 
 __attribute__((target("avx"))) static void wide_group(const double *C, size_t n_row, const rom_blocks *blocks,
                                                       const rom_pair *left, const rom_pair *right,
@@ -79,6 +125,12 @@ int rom_has_avx(void)
 #else
 
 #define wide_group plain_group
+
+static void plain_group(const double *C, size_t n_row, const rom_blocks *blocks, const rom_pair *left, const rom_pair *right,
+                        double part[N_GROUP][N_LANE])
+{
+    group(C, n_row, blocks, left, right, part);
+}
 
 int rom_has_avx(void)
 {

@@ -6,6 +6,15 @@
 
 #include "rom_names.h"
 
+/* For functions in which no step spends its time, among others that are compiled for speed */
+#if defined(__clang__)
+#define ROM_SMALL __attribute__((minsize))
+#elif defined(__GNUC__)
+#define ROM_SMALL __attribute__((cold))
+#else
+#define ROM_SMALL
+#endif
+
 /* The same monomial of the left and of the right half of the variables */
 typedef struct {
     double left, right;

@@ -24,7 +24,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
 }
 """Zig targets of each FMI platform; two targets make one universal file."""
 
-COMPILE = ("-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
+COMPILE = ("-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fomit-frame-pointer")
 """No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
 
 LINK = ("-s", "-shared")

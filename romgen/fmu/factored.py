@@ -9,7 +9,7 @@ import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.errors import InputError
-from romgen.fmu.programme import Exponent, MonomialProgramme, monomial_programme
+from romgen.fmu.programme import Exponent, MonomialProgramme, conjugate_programme, monomial_programme
 from romgen.fmu.real_chart import real_chart
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
@@ -66,7 +66,7 @@ class GroupedForm:
 
     Attributes
     ----------
-    base : monomials of (z_1..z_m, conj z_1..conj z_m) without pairs.
+    base : monomials of (z_1..z_m, conj z_1..conj z_m) without pairs (``conjugate_programme``).
     rows : for each N_j its groups, (position of the base, number of coefficients of P).
     coefficients : those of all P, over the first monomials of m variables.
     n_product : products of these that are needed.
@@ -107,7 +107,7 @@ def factored_model(model: ReducedModel) -> FactoredModel:
     resonant = model.normal_form.exponents.reshape(-1, 2 * m)
     squares, bases = _pairs_taken_out(resonant)
     halves = [part for p in (chart, sensor) for part in (p.exponents[:, :m], p.exponents[:, m:])]
-    half, base = monomial_programme(np.vstack([squares, *halves])), monomial_programme(bases)
+    half, base = monomial_programme(np.vstack([squares, *halves])), conjugate_programme(bases)
     for exponents in (resonant, chart.exponents, sensor.exponents):
         if np.any(np.sum(exponents, axis=1) == 0):
             raise InputError(

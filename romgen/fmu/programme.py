@@ -55,6 +55,54 @@ def monomial_programme(exponents: IntArray) -> MonomialProgramme:
     return MonomialProgramme(n_var, np.array(products, dtype=np.int64).reshape(-1, 2), index)
 
 
+def conjugate_programme(exponents: IntArray) -> MonomialProgramme:
+    """The same for the variables (z_1..z_m, conj z_1..conj z_m), with every monomial followed by its conjugate.
+
+    The order is 1, 1, z_1, conj z_1, .., z_m, conj z_m, then each product and its conjugate, which needs no product of
+    its own. A monomial that two earlier ones make is made of these, of the most equal degrees; those of a resonance
+    seldom need others.
+
+    Parameters
+    ----------
+    exponents : (n_term, 2m) non-negative, without z_j conj z_j in one row.
+    """
+    n_var = exponents.shape[1]
+    m = n_var // 2
+    one, *unit = [tuple(int(i == j) for i in range(n_var)) for j in (-1, *range(m))]
+    index: dict[Exponent, int] = {one: 0}
+    products: list[tuple[int, int]] = []
+
+    def add(row: Exponent) -> None:
+        index[row] = len(index) + 1  # 1, which is its own conjugate, stands for two
+        index[row[m:] + row[:m]] = index[row] + 1
+
+    def provide(row: Exponent) -> None:
+        if row in index:
+            return
+        pair = _earlier_pair(row, index)
+        if pair is None:
+            for half in _halves(row):
+                provide(half)
+            pair = _halves(row)
+        products.append((index[pair[0]], index[pair[1]]))
+        add(row)
+
+    for row in unit:
+        add(row)
+    for row in sorted({tuple(row) for row in exponents.tolist()}, key=lambda row: (sum(row), [-e for e in row])):
+        provide(row)
+    return MonomialProgramme(n_var, np.array(products, dtype=np.int64).reshape(-1, 2), index)
+
+
+def _earlier_pair(row: Exponent, index: dict[Exponent, int]) -> tuple[Exponent, Exponent] | None:
+    """Two monomials of the index whose product is ``row``, of the most equal degrees."""
+    earlier = np.array(list(index), dtype=np.int64)
+    factors = earlier[np.all(earlier <= row, axis=1)]
+    pairs = [(tuple(a), tuple(b)) for a, b in zip(factors.tolist(), (row - factors).tolist(), strict=True)]
+    known = [(a, b) for a, b in pairs if b in index]
+    return min(known, key=lambda pair: max(map(sum, pair)), default=None)
+
+
 def _made_of(exponent: Exponent) -> Iterator[Exponent]:
     """A monomial and all products that it is made of."""
     if sum(exponent) > 0:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from functools import reduce
 
 import numpy as np
 
@@ -58,13 +57,18 @@ def _substituted(
 
 
 def _expanded(row: Sequence[int], factors: Factors) -> Iterator[tuple[Exponent, complex]]:
-    """Monomials that one becomes, with their weights: per pair prod_k (f_k0 + f_k1 t)^e_k, in powers t^q of the second."""
+    """Monomials that one becomes, with their weights: for each pair those of prod_k (f_k0 + f_k1 t)^e_k."""
     m = len(row) // 2
-    weights = [
-        reduce(np.convolve, [*itertools.repeat(factors[0], row[j]), *itertools.repeat(factors[1], row[m + j])], [1.0])
-        for j in range(m)
-    ]
+    weights = [_weights([factors[0]] * row[j] + [factors[1]] * row[m + j]) for j in range(m)]
     for q in itertools.product(*map(np.flatnonzero, weights)):
         first = tuple(len(weight) - 1 - int(k) for weight, k in zip(weights, q, strict=True))
         value = math.prod(complex(weight[k]) for weight, k in zip(weights, q, strict=True))
         yield (*first, *map(int, q)), value
+
+
+def _weights(factors: Sequence[tuple[complex, complex]]) -> ComplexArray:
+    """Coefficients of a product of linear factors f_0 + f_1 t, by power of t."""
+    product = np.ones(1, dtype=np.complex128)
+    for factor in factors:
+        product = np.convolve(product, factor)
+    return product

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from romgen.fmu.programme import fold_conjugates, monomial_programme
+from romgen.fmu.programme import conjugate_programme, fold_conjugates, monomial_programme
 from romgen.polynomial import evaluate, exponents, monomials, zeta
 from romgen.reduced_model import ReducedModel
 from tests.romgen.fmu.models import random_states
@@ -42,6 +42,32 @@ def test_few_products_wait_for_one_another(table: np.ndarray) -> None:
 def test_a_full_table_needs_no_extra_monomials() -> None:
     table = exponents(4, 1, 7)
     assert monomial_programme(table).n_monomial == 1 + len(table)
+
+
+RESONANT = np.array([[0, 1, 1, 0], [2, 0, 0, 0], [3, 0, 0, 1], [0, 2, 2, 0], [0, 2, 3, 0], [5, 0, 0, 2], [0, 3, 4, 0]])
+
+
+@pytest.mark.parametrize("table", [RESONANT, np.array([[0, 0, 3, 2], [1, 0, 0, 6], [0, 0, 0, 0]]), RESONANT[:0]])
+def test_monomials_with_their_conjugates(table: np.ndarray) -> None:
+    programme = conjugate_programme(table)
+    rng = np.random.default_rng(1)
+    z = rng.uniform(-1.0, 1.0, 2) + 1j * rng.uniform(-1.0, 1.0, 2)
+    values = [1.0, 1.0, z[0], z[0].conj(), z[1], z[1].conj()]
+    for left, right in programme.products:
+        assert max(left, right) < len(values)
+        product = values[left] * values[right]
+        values += [product, product.conj()]
+    assert len(values) == 1 + programme.n_monomial
+    expected = monomials(np.array([[*z, *z.conj()]]), np.array(list(programme.index)))[0]
+    # At most 7 factors; a complex product is off by sqrt(5) units of rounding (Brent, Percival, Zimmermann 2007).
+    limit = 7 * np.sqrt(5.0) * np.finfo(float).eps
+    np.testing.assert_allclose(np.array(values)[list(programme.index.values())], expected, rtol=limit)
+    assert set(map(tuple, table.tolist())) <= set(programme.index)
+
+
+def test_resonant_monomials_need_no_others() -> None:
+    """Those of a 1:2 resonance are products of one another and their conjugates."""
+    assert len(conjugate_programme(RESONANT).products) == len(RESONANT)
 
 
 def test_folding_keeps_the_real_part_and_halves_the_terms(model: ReducedModel) -> None:

@@ -99,7 +99,7 @@ def test_a_cut_table_is_no_model(model: ReducedModel) -> None:
 def test_a_table_of_another_layout_is_no_model(model: ReducedModel) -> None:
     """A unit written before the order of the numbers changed must not be misread."""
     text, table = (data for _, data in sorted(model_resources(model, in_file=True).items(), reverse=True))
-    for old in (text.replace(b', "layout": 3', b""), text.replace(b'"layout": 3', b'"layout": 2')):
+    for old in (text.replace(b',"layout":3', b""), text.replace(b'"layout":3', b'"layout":2')):
         with pytest.raises(InputError, match="was written by another version of romgen; export the unit again"):
             model_from_json(old.decode(), table)
 
