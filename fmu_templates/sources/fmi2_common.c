@@ -77,6 +77,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         free(s);
         return NULL;
     }
+    s->workspace.wide = rom_has_avx();
     s->logger = logger;
     s->initial_categories = logger.categories;
     s->memory = rom_initial_memory(type);

@@ -50,8 +50,8 @@ static void sample(rom_instance *s, double tau, double u[])
 /* n = ceil(H / h_max), forgiving round-off in H, so that the number of sub-steps never depends on accumulated time */
 static double sub_step_count(const rom_memory *memory, double step)
 {
-    const double n = ceil(step / memory->max_internal_step - 1e-9);
-    return n < 1.0 ? 1.0 : n;
+    const double n = step / memory->max_internal_step - 1e-9;
+    return n <= 1.0 ? 1.0 : ceil(n);
 }
 
 /* Integrates over `step` in n sub-steps in place on a copy of the state; NULL, or the reason of a failure. `ratio`

@@ -30,7 +30,7 @@ static rom_complex exponential(rom_complex x)
 }
 
 /* phi_k(x) = sum_j x^j / (j + k)!, by Horner's rule from the last term */
-static rom_complex phi_series(int k, rom_complex x)
+ROM_SMALL static rom_complex phi_series(int k, rom_complex x)
 {
     rom_complex sum = {1.0, 0.0};
     for (int j = N_TAYLOR; j >= 1; --j) {
@@ -44,7 +44,7 @@ static rom_complex phi_series(int k, rom_complex x)
 }
 
 /* phi_0 = exp x, phi_k = (phi_{k-1} - 1/(k-1)!) / x; the recurrence cancels for small x, the series does not */
-static void phi_functions(rom_complex x, rom_complex phi[4])
+ROM_SMALL static void phi_functions(rom_complex x, rom_complex phi[4])
 {
     phi[0] = exponential(x);
     const double square = x.re * x.re + x.im * x.im;
@@ -62,7 +62,7 @@ static void phi_functions(rom_complex x, rom_complex phi[4])
     }
 }
 
-void rom_etdrk4_prepare(rom_etdrk4 *c, double h)
+ROM_SMALL void rom_etdrk4_prepare(rom_etdrk4 *c, double h)
 {
     if (c->h == h)
         return;

@@ -62,13 +62,13 @@ void rom_update_rate(rom_instance *s)
 /* Sensor row k, computed with the others of its kind */
 static double sensor(rom_instance *s, size_t k)
 {
-    const size_t first = k < N_SENSOR ? 0 : N_SENSOR;
-    const unsigned kind = k < N_SENSOR ? KNOWN_DISPLACEMENT : KNOWN_VELOCITY;
+    const size_t kind = k < N_SENSOR ? 0 : 1;
+    const unsigned known = kind == 0 ? KNOWN_DISPLACEMENT : KNOWN_VELOCITY;
     if ((s->known & KNOWN_CHART) == 0)
         rom_chart(s->memory.z, &s->workspace);
-    if ((s->known & kind) == 0)
-        rom_sensors(&s->workspace, first, first + N_SENSOR, s->output.sensor);
-    s->known |= KNOWN_CHART | kind;
+    if ((s->known & known) == 0)
+        rom_sensors(&s->workspace, kind, s->output.sensor + kind * N_SENSOR);
+    s->known |= KNOWN_CHART | known;
     return s->output.sensor[k];
 }
 

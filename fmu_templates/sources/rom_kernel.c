@@ -5,6 +5,9 @@
 
 #include "coefficients.h"
 
+static const rom_blocks chart_blocks = {chart_count, N_CHART_BLOCK, N_CHART_ENTRY};
+static const rom_blocks sensor_blocks = {sensor_count, N_SENSOR_BLOCK, N_SENSOR_ENTRY};
+
 static rom_complex multiply(rom_complex a, rom_complex b)
 {
     rom_complex c = {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
@@ -22,66 +25,120 @@ static double modulus(rom_complex a)
     return sqrt(a.re * a.re + a.im * a.im);
 }
 
-/* zeta = (z, conj z) */
-static void pair_with_conjugate(const rom_complex z[], rom_complex zeta[])
+static void with_conjugate(rom_complex a, rom_complex p[2])
 {
-    for (size_t j = 0; j < N_MODE; ++j) {
-        zeta[j] = z[j];
-        zeta[N_MODE + j].re = z[j].re;
-        zeta[N_MODE + j].im = -z[j].im;
-    }
+    const rom_complex conjugate = {a.re, -a.im};
+    p[0] = a;
+    p[1] = conjugate;
 }
 
-static rom_complex times_real(double s, rom_complex a)
+/* 1, z and products, each followed by its conjugate. Sizes that may be 0 come as arguments: compilers object to loops over
+   a constant 0. */
+static void base_monomials(const rom_complex z[], size_t n_product, rom_complex p[])
 {
-    rom_complex c = {s * a.re, s * a.im};
-    return c;
-}
-
-/* The first N_MODE of p are z */
-static void complex_monomials(const rom_product product[], size_t n_product, const rom_product pair[], size_t n_pair,
-                              rom_complex p[])
-{
-    rom_complex *next = p + N_REDUCED;
-    double square[N_MODE];
+    const rom_complex one = {1.0, 0.0};
+    rom_complex *next = p + 2 + N_REDUCED;
+    p[0] = p[1] = one;
     for (size_t j = 0; j < N_MODE; ++j)
-        square[j] = p[j].re * p[j].re + p[j].im * p[j].im;
-    for (size_t k = 0; k < n_product; ++k)
-        *next++ = multiply(p[product[k].left], p[product[k].right]);
-    for (size_t k = 0; k < n_pair; ++k)
-        *next++ = times_real(square[pair[k].right], p[pair[k].left]);
+        with_conjugate(z[j], p + 2 + 2 * j);
+    for (size_t k = 0; k < n_product; ++k, next += 2)
+        with_conjugate(multiply(p[base_product[k].left], p[base_product[k].right]), next);
 }
 
-static void complex_tangents(const rom_product product[], size_t n_product, const rom_product pair[], size_t n_pair,
-                             const rom_complex p[], rom_complex dp[])
+ROM_SMALL static void base_tangents(const rom_complex p[], const rom_complex dz[], size_t n_product, rom_complex dp[])
 {
-    rom_complex *next = dp + N_REDUCED;
-    for (size_t k = 0; k < n_product; ++k) {
-        const size_t a = product[k].left, b = product[k].right;
-        *next++ = add(multiply(dp[a], p[b]), multiply(p[a], dp[b]));
-    }
-    for (size_t k = 0; k < n_pair; ++k) {
-        const size_t a = pair[k].left, j = pair[k].right;
-        const double square = p[j].re * p[j].re + p[j].im * p[j].im;
-        const double change = 2.0 * (p[j].re * dp[j].re + p[j].im * dp[j].im);
-        *next++ = add(times_real(square, dp[a]), times_real(change, p[a]));
+    const rom_complex zero = {0.0, 0.0};
+    rom_complex *next = dp + 2 + N_REDUCED;
+    dp[0] = dp[1] = zero;
+    for (size_t j = 0; j < N_MODE; ++j)
+        with_conjugate(dz[j], dp + 2 + 2 * j);
+    for (size_t k = 0; k < n_product; ++k, next += 2) {
+        const size_t a = base_product[k].left, b = base_product[k].right;
+        with_conjugate(add(multiply(dp[a], p[b]), multiply(p[a], dp[b])), next);
     }
 }
 
-/* rate_j = sum over the stored terms of row j of N */
-static void normal_form_rows(const rom_tables *t, const rom_complex p[], rom_complex rate[])
+/* Monomials of two times m variables, x_j and y_j */
+static void pair_monomials(const rom_pair x[], size_t n_product, rom_pair p[])
+{
+    rom_pair *next = p + 1 + N_MODE;
+    p[0].left = p[0].right = 1.0;
+    memcpy(p + 1, x, N_MODE * sizeof *p);
+    for (size_t k = 0; k < n_product; ++k, ++next) {
+        const rom_pair a = p[half_product[k].left], b = p[half_product[k].right];
+        next->left = a.left * b.left;
+        next->right = a.right * b.right;
+    }
+}
+
+ROM_SMALL static void pair_tangents(const rom_pair p[], const rom_pair dx[], size_t n_product, rom_pair dp[])
+{
+    rom_pair *next = dp + 1 + N_MODE;
+    dp[0].left = dp[0].right = 0.0;
+    memcpy(dp + 1, dx, N_MODE * sizeof *dp);
+    for (size_t k = 0; k < n_product; ++k, ++next) {
+        const size_t a = half_product[k].left, b = half_product[k].right;
+        next->left = dp[a].left * p[b].left + p[a].left * dp[b].left;
+        next->right = dp[a].right * p[b].right + p[a].right * dp[b].right;
+    }
+}
+
+/* (Re z_j, Im z_j) */
+static void real_parts(const rom_complex z[], rom_pair x[])
 {
     for (size_t j = 0; j < N_MODE; ++j) {
-        rom_complex sum = {0.0, 0.0};
-        for (size_t k = form_row[j]; k < form_row[j + 1]; ++k)
-            sum = add(sum, multiply(t->form[k], p[form_term[k]]));
+        x[j].left = z[j].re;
+        x[j].right = z[j].im;
+    }
+}
+
+/* (y_j, y_{m + j}) */
+static void halves(const double y[], rom_pair x[])
+{
+    for (size_t j = 0; j < N_MODE; ++j) {
+        x[j].left = y[j];
+        x[j].right = y[N_MODE + j];
+    }
+}
+
+/* Monomials of |z_k|^2, twice each, for the two parts of complex coefficients */
+static void squares(const rom_complex z[], rom_pair p[])
+{
+    rom_pair square[N_MODE];
+    for (size_t j = 0; j < N_MODE; ++j)
+        square[j].left = square[j].right = z[j].re * z[j].re + z[j].im * z[j].im;
+    pair_monomials(square, N_FORM_PRODUCT, p);
+}
+
+ROM_SMALL static void squares_tangent(const rom_complex z[], const rom_complex dz[], const rom_pair p[], rom_pair dp[])
+{
+    rom_pair change[N_MODE];
+    for (size_t j = 0; j < N_MODE; ++j)
+        change[j].left = change[j].right = 2.0 * (z[j].re * dz[j].re + z[j].im * dz[j].im);
+    pair_tangents(p, change, N_FORM_PRODUCT, dp);
+}
+
+/* rate_j += sum over the groups of row j of base P(|z_1|^2, ..) */
+static void add_normal_form(const rom_tables *t, const rom_complex base[], const rom_pair square[], rom_complex rate[])
+{
+    const rom_complex *c = t->form;
+    for (size_t j = 0; j < N_MODE; ++j) {
+        rom_complex sum = rate[j];
+        for (size_t k = form_row[j]; k < form_row[j + 1]; ++k) {
+            rom_complex P = {0.0, 0.0};
+            for (size_t i = 0; i < form_group[k].count; ++i, ++c) {
+                P.re += c->re * square[i].left;
+                P.im += c->im * square[i].right;
+            }
+            sum = add(sum, multiply(base[form_group[k].base], P));
+        }
         rate[j] = sum;
     }
 }
 
-/* Sizes that may be 0 come as arguments: compilers object to loops over a constant 0. */
-static void add_inputs(const double u[], size_t n_input, rom_complex rate[])
+static void inputs(const double u[], size_t n_input, rom_complex rate[])
 {
+    memset(rate, 0, N_MODE * sizeof *rate);
     for (size_t i = 0; i < n_input; ++i)
         for (size_t j = 0; j < N_MODE; ++j) {
             rate[j].re += input_matrix[i][j].re * u[i];
@@ -89,108 +146,63 @@ static void add_inputs(const double u[], size_t n_input, rom_complex rate[])
         }
 }
 
-static void real_monomials(const rom_run run[], size_t n_run, double p[])
-{
-    size_t next = N_REDUCED;
-    for (size_t k = 0; k < n_run; ++k) {
-        const size_t n = run[k].count;
-        const double x = p[run[k].factor], *restrict left = p + run[k].left;
-        double *restrict target = p + next; /* behind all that is read */
-        for (size_t i = 0; i < n; ++i)
-            target[i] = left[i] * x;
-        next += n;
-    }
-}
-
-static void real_tangents(const rom_run run[], size_t n_run, const double p[], double dp[])
-{
-    double *next = dp + N_REDUCED;
-    for (size_t k = 0; k < n_run; ++k) {
-        const size_t b = run[k].factor, end = run[k].left + (size_t)run[k].count;
-        for (size_t a = run[k].left; a < end; ++a)
-            *next++ = dp[a] * p[b] + p[a] * dp[b];
-    }
-}
-
-/* y/s = Re(T p); conjugate pairs of monomials are folded into one when the coefficients are written. Even and odd
-   monomials are summed apart, so that an addition need not wait for the one before it. */
-static void chart_rows(const rom_tables *t, const rom_complex p[], double y[])
-{
-    double sum[2][N_REDUCED] = {{0.0}};
-    size_t k = N_CHART_MONOMIAL % 2;
-    for (size_t l = 0; k > 0 && l < N_REDUCED; ++l)
-        sum[0][l] = t->chart_re[0][l] * p[0].re - t->chart_im[0][l] * p[0].im;
-    for (; k < N_CHART_MONOMIAL; k += 2)
-        for (size_t e = 0; e < 2; ++e)
-            for (size_t l = 0; l < N_REDUCED; ++l)
-                sum[e][l] += t->chart_re[k + e][l] * p[k + e].re - t->chart_im[k + e][l] * p[k + e].im;
-    for (size_t l = 0; l < N_REDUCED; ++l)
-        y[l] = sum[0][l] + sum[1][l];
-}
-
-/* a . b in four sums, as above; arrays of two, which compilers take for vectors */
-static double dot(const double a[], const double b[], size_t n)
-{
-    double even[2] = {0.0, 0.0}, odd[2] = {0.0, 0.0};
-    size_t k = n % 4;
-    for (size_t e = 0; e < k; ++e)
-        even[0] += a[e] * b[e];
-    for (; k < n; k += 4) {
-        even[0] += a[k] * b[k];
-        even[1] += a[k + 1] * b[k + 1];
-        odd[0] += a[k + 2] * b[k + 2];
-        odd[1] += a[k + 3] * b[k + 3];
-    }
-    return (even[0] + odd[0]) + (even[1] + odd[1]);
-}
-
-static void sensor_rows(const rom_tables *t, const double p[], size_t first, size_t end, double x[])
-{
-    for (size_t i = first; i < end; ++i)
-        x[i] = dot(t->sensor[i], p, N_SENSOR_MONOMIAL);
-}
-
 void rom_nonlinear_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
 {
-    pair_with_conjugate(z, w->form);
-    complex_monomials(form_product, N_FORM_PRODUCT, form_pair, N_FORM_PAIR, w->form);
-    normal_form_rows(&w->tables, w->form, rate);
-    add_inputs(u, N_INPUT, rate);
+    base_monomials(z, N_BASE_PRODUCT, w->base);
+    squares(z, w->square);
+    inputs(u, N_INPUT, rate);
+    add_normal_form(&w->tables, w->base, w->square, rate);
 }
 
-void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
+ROM_SMALL void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_complex rate[])
 {
     rom_nonlinear_rate(z, u, w, rate);
     for (size_t j = 0; j < N_MODE; ++j)
         rate[j] = add(rate[j], multiply(eigenvalue[j], z[j]));
 }
 
-void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
+ROM_SMALL void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
                       rom_complex drate[])
 {
-    rom_nonlinear_rate(z, du, w, drate); /* for the monomials */
-    pair_with_conjugate(dz, w->form_tangent);
-    complex_tangents(form_product, N_FORM_PRODUCT, form_pair, N_FORM_PAIR, w->form, w->form_tangent);
-    normal_form_rows(&w->tables, w->form_tangent, drate);
-    add_inputs(du, N_INPUT, drate);
+    base_monomials(z, N_BASE_PRODUCT, w->base);
+    base_tangents(w->base, dz, N_BASE_PRODUCT, w->base_tangent);
+    squares(z, w->square);
+    squares_tangent(z, dz, w->square, w->square_tangent);
+    inputs(du, N_INPUT, drate);
+    add_normal_form(&w->tables, w->base_tangent, w->square, drate);
+    add_normal_form(&w->tables, w->base, w->square_tangent, drate);
     for (size_t j = 0; j < N_MODE; ++j)
         drate[j] = add(drate[j], multiply(eigenvalue[j], dz[j]));
 }
 
 void rom_chart(const rom_complex z[], rom_workspace *w)
 {
-    pair_with_conjugate(z, w->chart);
-    complex_monomials(chart_product, N_CHART_PRODUCT, chart_pair, N_CHART_PAIR, w->chart);
-    chart_rows(&w->tables, w->chart, w->sensor);
-    real_monomials(sensor_run, N_SENSOR_RUN, w->sensor);
+    rom_pair x[N_MODE];
+    double y[N_REDUCED];
+    real_parts(z, x);
+    pair_monomials(x, N_CHART_PRODUCT, w->chart);
+    rom_rows(w->tables.chart, N_REDUCED, &chart_blocks, w->chart, w->chart, w->wide, y);
+    halves(y, x);
+    pair_monomials(x, N_SENSOR_PRODUCT, w->sensor);
 }
 
-void rom_sensors(const rom_workspace *w, size_t first, size_t end, double x[])
+void rom_sensors(const rom_workspace *w, size_t kind, double x[])
 {
-    sensor_rows(&w->tables, w->sensor, first, end, x);
+    rom_rows(w->tables.sensor[kind], N_SENSOR, &sensor_blocks, w->sensor, w->sensor, w->wide, x);
 }
 
-void rom_amplitudes(const rom_complex z[], rom_output *out)
+/* d(left right) = d left right + left d right */
+ROM_SMALL static void rows_tangent(const double C[], size_t n_row, const rom_blocks *blocks, const rom_pair p[], const rom_pair dp[],
+                         int wide, double dx[])
+{
+    double second[N_SENSOR > N_REDUCED ? N_SENSOR : N_REDUCED];
+    rom_rows(C, n_row, blocks, dp, p, wide, dx);
+    rom_rows(C, n_row, blocks, p, dp, wide, second);
+    for (size_t i = 0; i < n_row; ++i)
+        dx[i] += second[i];
+}
+
+ROM_SMALL void rom_amplitudes(const rom_complex z[], rom_output *out)
 {
     for (size_t j = 0; j < N_MODE; ++j) {
         out->amplitude[j] = modulus(z[j]);
@@ -209,7 +221,7 @@ static double facet_value(size_t k, const double r[])
 }
 
 /* d|z_j| = Re(conj z_j dz_j) / |z_j|, d arg z_j = Im(conj z_j dz_j) / |z_j|^2, both taken as 0 at rest; the trust ratio follows the facet that leads it */
-static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
+ROM_SMALL static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], rom_output *dout)
 {
     double r[N_MODE], leading = -1.0;
     for (size_t j = 0; j < N_MODE; ++j) {
@@ -226,15 +238,21 @@ static void amplitude_tangents(const rom_complex z[], const rom_complex dz[], ro
     }
 }
 
-void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout)
+ROM_SMALL void rom_outputs_tangent(const rom_complex z[], const rom_complex dz[], rom_workspace *w, rom_output *dout)
 {
+    rom_pair dx[N_MODE];
+    double dy[N_REDUCED];
     memset(dout, 0, sizeof *dout);
     rom_chart(z, w);
-    pair_with_conjugate(dz, w->chart_tangent);
-    complex_tangents(chart_product, N_CHART_PRODUCT, chart_pair, N_CHART_PAIR, w->chart, w->chart_tangent);
-    chart_rows(&w->tables, w->chart_tangent, w->sensor_tangent);
-    real_tangents(sensor_run, N_SENSOR_RUN, w->sensor, w->sensor_tangent);
-    sensor_rows(&w->tables, w->sensor_tangent, 0, N_SENSOR_ROW, dout->sensor);
+    real_parts(dz, dx);
+    pair_tangents(w->chart, dx, N_CHART_PRODUCT, w->tangent);
+    rows_tangent(w->tables.chart, N_REDUCED, &chart_blocks, w->chart, w->tangent,
+                 w->wide, dy);
+    halves(dy, dx);
+    pair_tangents(w->sensor, dx, N_SENSOR_PRODUCT, w->tangent);
+    for (size_t kind = 0; kind < 2; ++kind)
+        rows_tangent(w->tables.sensor[kind], N_SENSOR, &sensor_blocks, w->sensor,
+                     w->tangent, w->wide, dout->sensor + kind * N_SENSOR);
     amplitude_tangents(z, dz, dout);
 }
 

@@ -1,18 +1,23 @@
 /* The reduced model: z' = Lambda z + N zeta^E + G u,  y/s = Re(T zeta^E),  x = W (y/s)^E,  x' = W_v (y/s)^E,
-   with zeta = (z_1 .. z_m, conj z_1 .. conj z_m). Nothing here allocates, and no data is ever written but the arguments. */
+   with zeta = (z_1 .. z_m, conj z_1 .. conj z_m). Nothing here allocates, and no data is ever written but the arguments.
+
+   All monomials are products of a few. In N those of abs(z_k)^2, which are real, are summed first for each of the rest.
+   Chart, as a polynomial of (Re z, Im z), and sensors are sum_ab C_ab left_a right_b, with monomials of the first and of
+   the last half of the variables. */
 #ifndef ROM_KERNEL_H
 #define ROM_KERNEL_H
 
 #include <stddef.h>
 
-#include "rom_names.h"
+#include "rom_rows.h"
 
 #define N_REDUCED (2 * N_MODE)
 #define N_SENSOR_ROW (2 * N_SENSOR)
 #define ROM_AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 
-#define N_FORM_MONOMIAL (N_REDUCED + N_FORM_PRODUCT + N_FORM_PAIR)
-#define N_CHART_MONOMIAL (N_REDUCED + N_CHART_PRODUCT + N_CHART_PAIR)
+#define N_HALF_MONOMIAL (1 + N_MODE + N_HALF_PRODUCT)
+#define N_HALF_PADDED ((N_HALF_MONOMIAL + N_LANE - 1) / N_LANE * N_LANE)
+#define N_BASE_MONOMIAL (2 * (1 + N_MODE + N_BASE_PRODUCT)) /* each followed by its conjugate */
 
 #define N_BASE_MOTION (ABSOLUTE_OUTPUTS ? 2 : 0) /* displacement and velocity of the base, inputs */
 #define N_ABSOLUTE (ABSOLUTE_OUTPUTS ? N_SENSOR_ROW : 0)
@@ -28,30 +33,30 @@ static inline int rom_is_finite(double x)
     return x - x == 0.0;
 }
 
-/* Complex monomials: the variables, then products of two earlier ones, then earlier ones times |z_right|^2, which is real. */
+/* Monomials: 1, the variables, then products of two earlier ones. */
 typedef struct {
     unsigned short left, right;
 } rom_product;
 
-/* Real monomials: the variables, then runs of `count` that follow each other, each an earlier one, from `left` on and
-   likewise following each other, times the variable `factor`. */
+/* Terms of N with the same monomial `base` but for its pairs z_k conj z_k: `count` coefficients over the monomials of these. */
 typedef struct {
-    unsigned short left, factor, count;
-} rom_run;
+    unsigned short base, count;
+} rom_group;
 
 /* The large tables of coefficients: doubles only, so that a file can hold them as one array. Each instance has its own. */
 typedef struct {
     rom_complex form[ROM_AT_LEAST_ONE(N_FORM_TERM)];
-    double chart_re[N_CHART_MONOMIAL][N_REDUCED], chart_im[N_CHART_MONOMIAL][N_REDUCED];
-    double sensor[N_SENSOR_ROW][N_SENSOR_MONOMIAL];
+    double chart[N_REDUCED * N_CHART_ENTRY];
+    double sensor[2][N_SENSOR * N_SENSOR_ENTRY]; /* displacements, velocities */
 } rom_tables;
 
 /* Tables, and monomials and their tangents; kept with the instance so that no step needs memory or much stack. */
 typedef struct {
     rom_tables tables;
-    rom_complex form[N_FORM_MONOMIAL], form_tangent[N_FORM_MONOMIAL];
-    rom_complex chart[N_CHART_MONOMIAL], chart_tangent[N_CHART_MONOMIAL];
-    double sensor[N_SENSOR_MONOMIAL], sensor_tangent[N_SENSOR_MONOMIAL];
+    int wide; /* whether the processor has AVX; results do not depend on it */
+    rom_complex base[N_BASE_MONOMIAL], base_tangent[N_BASE_MONOMIAL];
+    rom_pair square[N_HALF_MONOMIAL], square_tangent[N_HALF_MONOMIAL];
+    rom_pair chart[N_HALF_PADDED], sensor[N_HALF_PADDED], tangent[N_HALF_PADDED]; /* what pads the last block stays 0 */
 } rom_workspace;
 
 typedef struct {
@@ -71,11 +76,11 @@ void rom_rate(const rom_complex z[], const double u[], rom_workspace *w, rom_com
 void rom_rate_tangent(const rom_complex z[], const rom_complex dz[], const double du[], rom_workspace *w,
                       rom_complex drate[]);
 
-/* y/s = Re(T zeta^E) and its monomials, kept in the workspace */
+/* y/s = Re(T zeta^E): its monomials for the sensors, kept in the workspace */
 void rom_chart(const rom_complex z[], rom_workspace *w);
 
-/* Rows first .. end - 1 of the sensors x: N_SENSOR displacements, then as many velocities; after rom_chart */
-void rom_sensors(const rom_workspace *w, size_t first, size_t end, double x[]);
+/* The N_SENSOR displacements (kind 0) or velocities (kind 1) x; after rom_chart */
+void rom_sensors(const rom_workspace *w, size_t kind, double x[]);
 
 /* |z_j|, arg z_j and the trust ratio */
 void rom_amplitudes(const rom_complex z[], rom_output *out);

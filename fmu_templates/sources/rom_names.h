@@ -20,6 +20,8 @@
 #define rom_trained_amplitude ROM_NAME(rom_trained_amplitude)
 #define rom_base_share ROM_NAME(rom_base_share)
 #define rom_sensor_size ROM_NAME(rom_sensor_size)
+#define rom_rows ROM_NAME(rom_rows)
+#define rom_has_avx ROM_NAME(rom_has_avx)
 #define rom_find_start ROM_NAME(rom_find_start)
 #define rom_update_start ROM_NAME(rom_update_start)
 #define rom_output_part ROM_NAME(rom_output_part)

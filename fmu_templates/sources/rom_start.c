@@ -27,7 +27,8 @@ static void judge(const double target[], rom_workspace *work, candidate *c)
     double x[ROM_AT_LEAST_ONE(N_SENSOR_ROW)];
     state_of(c->w, z);
     rom_chart(z, work);
-    rom_sensors(work, 0, N_SENSOR_ROW, x);
+    for (size_t kind = 0; kind < 2; ++kind)
+        rom_sensors(work, kind, x + kind * N_SENSOR);
     c->cost = 0.0;
     for (size_t i = 0; i < N_SENSOR_ROW; ++i) {
         c->misfit[i] = (x[i] - target[i]) / rom_sensor_size(i);

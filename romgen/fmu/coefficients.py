@@ -8,24 +8,21 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
-from romgen.errors import InputError
 from romgen.etdrk4 import largest_step
+from romgen.fmu.factored import N_GROUP, N_LANE, GroupedForm, factored_model
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
-from romgen.fmu.programme import MonomialProgramme, complex_programme, fold_conjugates
+from romgen.fmu.programme import MonomialProgramme
 from romgen.fmu.records import PLAIN, InterfaceOptions
-from romgen.fmu.tables import sensor_programme, table_hash
+from romgen.fmu.tables import table_hash
 from romgen.reduced_model import ReducedModel
 
 HARD_LIMIT = 3.0
 """Default of the parameter hard_limit, in distances of the trained range (``romgen.trained_range``)."""
 
-MAX_PRODUCTS = 60000
-"""Monomials are numbered by 16-bit integers in the runtime."""
-
 
 def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) -> str:
     """The text of coefficients.h: small constant data only, decimal numbers that read back exactly."""
-    form, chart, sensor = _programmes(model)
+    factored = factored_model(model)
     return "\n".join(
         [
             f"/* Coefficients of the reduced model {model.name}; generated, data only. */",
@@ -38,10 +35,11 @@ def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) 
             _array("double trained_amplitude[N_MODE]", map(_real, model.trained_amplitude)),
             _array("double trained_facet[N_FACET][N_MODE]", map(_real_row, model.trained_range.facets)),
             _array("rom_complex input_matrix[ROM_AT_LEAST_ONE(N_INPUT)][N_MODE]", _input_rows(model.input_matrix)),
-            _products("form", form),
-            _normal_form(model, form),
-            _products("chart", chart),
-            _runs("sensor", sensor),
+            _products("half", factored.half),
+            _products("base", factored.form.base),
+            _groups(factored.form),
+            _array("unsigned short chart_count[N_CHART_BLOCK]", map(str, factored.chart.count)),
+            _array("unsigned short sensor_count[N_SENSOR_BLOCK]", map(str, factored.sensor.count)),
             _array("double base_share[N_SENSOR]", map(_real, options.base_share or (0.0,) * len(model.sensors))),
             _array("double sensor_size[2]", map(_real, _sensor_sizes(model))),
             "#endif",
@@ -60,7 +58,8 @@ def tables_header(table: bytes) -> str:
 def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], options: InterfaceOptions = PLAIN) -> str:
     """The text of model_sizes.h: identity and sizes of the model; ``data`` is coefficients.h and the large tables."""
     content_hash = hashlib.sha256(data[0].encode() + data[1]).hexdigest()
-    form, chart, sensor = _programmes(model)
+    factored = factored_model(model)
+    half, form, chart, sensor = factored.half, factored.form, factored.chart, factored.sensor
     sizes = {
         "N_MODE": len(model.eigenvalues),
         "N_FACET": len(model.trained_range.facets),
@@ -68,13 +67,19 @@ def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], option
         "N_SENSOR": len(model.sensors),
         "ABSOLUTE_OUTPUTS": int(options.base_share is not None),
         "START_FROM_SENSORS": int(options.start_from_sensors),
-        "N_FORM_PRODUCT": len(form.products),
-        "N_FORM_PAIR": len(form.pairs),
-        "N_FORM_TERM": int(np.count_nonzero(model.normal_form.coefficients)),
-        "N_CHART_PRODUCT": len(chart.products),
-        "N_CHART_PAIR": len(chart.pairs),
-        "N_SENSOR_MONOMIAL": sensor.n_monomial,
-        "N_SENSOR_RUN": len(sensor.runs),
+        "N_LANE": N_LANE,
+        "N_GROUP": N_GROUP,
+        "N_HALF_PRODUCT": len(half.products),
+        "N_BASE_PRODUCT": len(form.base.products),
+        "N_FORM_GROUP": sum(map(len, form.rows)),
+        "N_FORM_TERM": len(form.coefficients),
+        "N_FORM_PRODUCT": form.n_product,
+        "N_CHART_PRODUCT": chart.n_product,
+        "N_CHART_BLOCK": len(chart.count),
+        "N_CHART_ENTRY": chart.n_entry,
+        "N_SENSOR_PRODUCT": sensor.n_product,
+        "N_SENSOR_BLOCK": len(sensor.count),
+        "N_SENSOR_ENTRY": sensor.n_entry,
         "DEFAULT_HARD_LIMIT": _real(HARD_LIMIT),
         "DEFAULT_MAX_INTERNAL_STEP": _real(largest_step(model.eigenvalues)),
         "MODEL_IDENTIFIER": model.name,
@@ -93,58 +98,21 @@ def _sensor_sizes(model: ReducedModel) -> tuple[float, float]:
     return float(np.max(nominal_displacement(model))) or 1.0, float(np.max(nominal_velocity(model))) or 1.0
 
 
-def _normal_form(model: ReducedModel, programme: MonomialProgramme) -> str:
-    """Which monomials have nonzero terms in N, row by row."""
-    position = [programme.index[tuple(int(e) for e in row)] for row in model.normal_form.exponents]
-    starts, terms = [0], []
-    for row in model.normal_form.coefficients:
-        used = np.flatnonzero(row)
-        terms += [position[k] for k in used]
-        starts.append(len(terms))
+def _products(name: str, programme: MonomialProgramme) -> str:
+    items = [f"{{{left}, {right}}}" for left, right in programme.products] or ["{0, 0}"]
+    return _array(f"rom_product {name}_product[ROM_AT_LEAST_ONE(N_{name.upper()}_PRODUCT)]", items)
+
+
+def _groups(form: GroupedForm) -> str:
+    """Where the groups of each row begin, and all groups."""
+    starts = np.cumsum([0, *map(len, form.rows)])
+    groups = [f"{{{base}, {count}}}" for row in form.rows for base, count in row]
     return "\n".join(
         [
             _array("unsigned form_row[N_MODE + 1]", map(str, starts)),
-            _array("unsigned short form_term[ROM_AT_LEAST_ONE(N_FORM_TERM)]", map(str, terms or [0])),
+            _array("rom_group form_group[ROM_AT_LEAST_ONE(N_FORM_GROUP)]", groups or ["{0, 0}"]),
         ]
     )
-
-
-def _programmes(model: ReducedModel) -> tuple[MonomialProgramme, MonomialProgramme, MonomialProgramme]:
-    """The monomials of normal form, chart and sensors.
-
-    Raises
-    ------
-    InputError : more of them than the runtime can number.
-    """
-    form = complex_programme(model.normal_form.exponents)
-    chart = complex_programme(fold_conjugates(model.chart).exponents)
-    sensor = sensor_programme(model)
-    for name, programme in (("form", form), ("chart", chart), ("sensor", sensor)):
-        if programme.n_monomial > MAX_PRODUCTS:
-            raise InputError(
-                f"the {name} map has too many monomials",
-                where="FMU export",
-                value=programme.n_monomial,
-                advice="lower the order",
-            )
-    return form, chart, sensor
-
-
-def _products(name: str, programme: MonomialProgramme) -> str:
-    """Products and pairs of complex monomials."""
-    arrays = []
-    for kind, rows in (("product", programme.products), ("pair", programme.pairs)):
-        items = [f"{{{left}, {right}}}" for left, right in rows] or ["{0, 0}"]
-        size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_{kind.upper()})"
-        arrays.append(_array(f"rom_product {name}_{kind}[{size}]", items))
-    return "\n".join(arrays)
-
-
-def _runs(name: str, programme: MonomialProgramme) -> str:
-    """Products of real monomials, those that follow each other as one run."""
-    size = f"ROM_AT_LEAST_ONE(N_{name.upper()}_RUN)"
-    runs = [f"{{{left}, {factor}, {count}}}" for left, factor, count in programme.runs] or ["{0, 0, 0}"]
-    return _array(f"rom_run {name}_run[{size}]", runs)
 
 
 def _array(declaration: str, items: Iterable[str]) -> str:

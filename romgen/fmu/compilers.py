@@ -24,12 +24,12 @@ TARGETS: dict[str, tuple[str, ...]] = {
 }
 """Zig targets of each FMI platform; two targets make one universal file."""
 
-COMPILE = ("-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
+COMPILE = ("-std=c99", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fomit-frame-pointer")
 """No contraction to fused multiply-add, so that processors agree to the rounding of the C library."""
 
 LINK = ("-s", "-shared")
 
-FAST_FILES = ("rom_etdrk4.c", "rom_kernel.c")
+FAST_FILES = ("rom_etdrk4.c", "rom_kernel.c", "rom_rows.c")
 """Files in which steps spend their time are compiled for speed, the others for size."""
 
 NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")

@@ -80,8 +80,12 @@ def _content(model: ReducedModel, table: str | None = None) -> dict[str, object]
 
 
 def _text(content: dict[str, object]) -> str:
-    lines = [f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items()]
+    lines = [f"{json.dumps(key)}: {_compact(value)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _compact(value: object) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
 def _map(p: PolynomialMap[np.float64] | PolynomialMap[np.complex128], table: str | None = None) -> dict[str, object]:

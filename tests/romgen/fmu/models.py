@@ -13,10 +13,13 @@ from romgen.reduced_model import ReducedModel
 SENSORS = ("lower", "mid span", "upper")
 
 
-def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "random_panel") -> ReducedModel:
+def random_model(
+    order: int = 5, n_input: int = 1, seed: int = 7, name: str = "random_panel", sensor_order: int | None = None
+) -> ReducedModel:
     """Two modes near 110 and 221 Hz with 0.4 % damping, conservative terms of the 1:2 resonance, three sensors.
 
-    Coefficients of degree d fall as 1/d!; amplitudes of order 1 are trained.
+    Coefficients of degree d fall as 1/d!; amplitudes of order 1 are trained. Sensor maps are of the same order unless
+    told otherwise.
     """
     rng = np.random.default_rng(seed)
     omega = 2.0 * np.pi * np.array([110.0, 221.0])
@@ -26,8 +29,9 @@ def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "r
     for j in range(2):
         chart[j, j] += 1.0
         chart[2 + j, j] += 1j
-    x = 1e-3 * _decay(real) * rng.standard_normal((3, len(real)))
-    v = 1e-3 * omega[0] * _decay(real) * rng.standard_normal((3, len(real)))
+    field = exponents(4, 1, sensor_order or order)
+    x = 1e-3 * _decay(field) * rng.standard_normal((3, len(field)))
+    v = 1e-3 * omega[0] * _decay(field) * rng.standard_normal((3, len(field)))
     return ReducedModel(
         name=name,
         eigenvalues=lam,
@@ -35,8 +39,8 @@ def random_model(order: int = 5, n_input: int = 1, seed: int = 7, name: str = "r
         chart=PolynomialMap(real, chart),
         inverse_chart=PolynomialMap(real, _complex(rng, (2, len(real)))),
         scale=np.ones(4),
-        displacement=PolynomialMap(real, x),
-        velocity=PolynomialMap(real, v),
+        displacement=PolynomialMap(field, x),
+        velocity=PolynomialMap(field, v),
         sensors=SENSORS,
         inputs=("base_acceleration", "shaker force")[:n_input],
         input_units=("m/s2", "N")[:n_input],
