@@ -33,10 +33,10 @@ UTILISATION = 0.8
 """Share of the friction limit from which on a sticking point is taken for one that will slip."""
 
 GROWTH = 0.1
-"""Share of the points by which those that slip outside must outnumber them before the compliance is made anew."""
+"""Points join when more than this share of those known slip or open besides."""
 
-BLOCK = 32
-"""Columns of the compliance that are solved for together."""
+GROUP = 10
+"""Points whose forces are solved for together: always the same ones, so that a restart finds the same bits."""
 
 NEWTON_STEPS, NEWTON_TOLERANCE = 8, 1e-2
 KRYLOV_STEPS, KRYLOV_TOLERANCE = 40, 1e-2
@@ -48,10 +48,10 @@ class LoosePoints:
 
     Attributes
     ----------
-    index : (n,) numbers among the contact points, increasing.
+    index : (n,) numbers among the contact points, in the order in which they joined.
     gap, pull : products with their rows B of the operator, (3 n, n_case) from (n_dof, n_case), and with B'.
     weight : (3 n,) m^2; initial_gap : (n,) m; law : (n, 3) as in ``Contact``; stick : (3 n,) Pa/m, D of the factor.
-    compliance : (3 n, 3 n) m/N, (1-af) b h^2 B A^-1 B', symmetric.
+    compliance : (3 n, 3 n) m/N, (1-af) b h^2 B A^-1 B', symmetric but for rounding.
     """
 
     index: IntArray
@@ -88,7 +88,11 @@ class LoosePoints:
 
 
 def loose_points(
-    contact: Contact, closed: BoolArray, index: IntArray, response: Callable[[FloatArray], FloatArray]
+    contact: Contact,
+    closed: BoolArray,
+    index: IntArray,
+    response: Callable[[FloatArray], FloatArray],
+    known: LoosePoints | None = None,
 ) -> LoosePoints:
     """The points ``index`` (n,) of a contact with their compliance.
 
@@ -96,13 +100,20 @@ def loose_points(
     ----------
     closed : (n_point,) points that the factor has stuck.
     response : forces (n_dof, n_column) N -> displacements (n_dof, n_column) m, (1-af) b h^2 A^-1.
+    known : the first of these points, by the same factor: nothing is solved for twice.
     """
     rows = (3 * index[:, None] + np.arange(3)).ravel()
     operator = contact.operator[rows].tocsr()
     compliance = np.empty((len(rows), len(rows)), dtype=np.float32)
-    for first in range(0, len(rows), BLOCK):
-        forces = np.ascontiguousarray(operator[first : first + BLOCK].T.toarray())
-        compliance[first : first + BLOCK] = (operator @ response(forces)).T
+    start = 0
+    if known is not None and np.array_equal(known.index, index[: len(known.index)]):
+        start = len(known.compliance)
+        compliance[:start, :start] = known.compliance
+    for first in range(start, len(rows), 3 * GROUP):
+        group = slice(first, first + 3 * GROUP)
+        moved = operator[: group.stop] @ response(np.ascontiguousarray(operator[group].T.toarray()))
+        compliance[: group.stop, group] = moved
+        compliance[group, :first] = moved[:first].T
     stick = contact.law[index][:, [0, 1, 1]] * closed[index, None]
     return LoosePoints(
         index,
@@ -117,16 +128,21 @@ def loose_points(
 
 
 def loosened(index: IntArray, contact: Contact, state: ContactState, closed: BoolArray) -> IntArray:
-    """The points of ``index`` (n,), with more of them where enough others slip or open in any case of ``state``."""
+    """The points ``index`` (n,), behind them more where enough others slip or open in any case of ``state``.
+
+    Those near their friction limit join with them, and the nearest of the rest until a group is full.
+    """
     moving = (state.status == 2).any(axis=1) | ((state.status > 0) != closed[:, None]).any(axis=1)
-    known = np.zeros(len(moving), dtype=bool)
-    known[index] = True
-    if np.count_nonzero(moving & ~known) <= GROWTH * len(index):
+    moving[index] = False
+    if np.count_nonzero(moving) <= GROWTH * len(index):
         return index
     normal, first, second = (state.traction[k::3] for k in range(3))
-    near = (first**2 + second**2 > (UTILISATION * contact.law[:, 2:] * normal) ** 2).any(axis=1)
-    wanted = np.flatnonzero(known | moving | near)
-    return wanted if len(wanted) <= LARGEST else index
+    limit = np.maximum(-contact.law[:, 2:] * normal, np.finfo(float).tiny)
+    used = (np.hypot(first, second) / limit).max(axis=1)
+    used[moving], used[index] = np.inf, -np.inf
+    wanted = -(-np.count_nonzero(used > UTILISATION) // GROUP) * GROUP
+    count = min(wanted, LARGEST - len(index), len(used) - len(index))
+    return np.concatenate([index, np.argsort(-used, kind="stable")[:count]])
 
 
 @inlined

@@ -72,7 +72,8 @@ class Preconditioner:
             share = (1.0 - s.alpha_f) * equation.step**2 * s.beta
             closed = dynamics.equilibrium.contact.status[:, 0] > 0
             contact = dynamics.model.contact
-            self._loose = loose_points(contact, closed, index, lambda f: share * mask * factor.solve(mask * f))
+            known = self._loose
+            self._loose = loose_points(contact, closed, index, lambda f: share * mask * factor.solve(mask * f), known)
         return self._loose
 
     def prepare(self, level: int, pace: Pace, u: FloatArray) -> Solve:

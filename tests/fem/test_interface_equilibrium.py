@@ -95,7 +95,7 @@ def test_krylov_steps_solve_a_system() -> None:
 
 
 def test_points_join_when_enough_of_them_slip(strip: Strip) -> None:
-    """One slips, one is at 90 % of its limit: both join; a tenth of those known does not start anew."""
+    """One slips, one is at 90 % of its limit, the eight nearest fill the group; a tenth of those known brings none."""
     contact = strip.model.contact
     closed = np.ones(contact.n_point, dtype=bool)
     status = np.full((contact.n_point, 2), STICK)
@@ -103,20 +103,34 @@ def test_points_join_when_enough_of_them_slip(strip: Strip) -> None:
     traction = np.zeros((contact.n_point, 3, 2))
     traction[:, 0] = -1e6
     traction[9, 2, 0] = 0.9e6 * contact.law[9, 2]
-    traction[11, 2, 0] = 0.7e6 * contact.law[11, 2]
+    nearest = np.array([11, 17, 3, 4, 8, 1, 0, 16])
+    traction[nearest, 2, 0] = np.linspace(0.7e6, 0.1e6, 8) * contact.law[nearest, 2]
     state = ContactState(traction.reshape(-1, 2), strip.equilibrium.contact.slip, status)
     none = np.array([], dtype=np.int64)
-    np.testing.assert_array_equal(loosened(none, contact, state, closed), [5, 9])
+    np.testing.assert_array_equal(loosened(none, contact, state, closed), [5, 9, *nearest])
     known = np.setdiff1d(np.arange(18), [5])
     np.testing.assert_array_equal(loosened(known, contact, state, closed), known)
     assert not len(loosened(none, contact, replace(state, status=np.full_like(status, STICK)), closed))
+
+
+def test_compliance_grows_to_the_same_bits(strip: Strip) -> None:
+    """Group after group as the march finds them, or all at once as a restart does."""
+    transient = make_transient(strip)
+    order = np.random.default_rng(2).permutation(strip.model.contact.n_point)
+    pre = transient._preconditioner
+    grown = [pre.loose(order[:n]) for n in (apart.GROUP, len(order))]
+    pre._loose = None
+    whole = pre.loose(order)
+    assert whole is not None
+    assert grown[1] is not None
+    np.testing.assert_array_equal(grown[1].compliance, whole.compliance)
 
 
 def test_too_many_points_are_left_to_the_outer_iteration(strip: Strip, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "LARGEST", 3)
     contact = strip.model.contact
     state = replace(strip.equilibrium.contact, status=np.full((contact.n_point, 1), SLIP))
-    assert not len(loosened(np.array([], dtype=np.int64), contact, state, np.ones(contact.n_point, dtype=bool)))
+    assert len(loosened(np.array([], dtype=np.int64), contact, state, np.ones(contact.n_point, dtype=bool))) == 3
 
 
 def test_slipping_steps_take_fewer_iterations_to_the_same_motion(strip: Strip) -> None:
