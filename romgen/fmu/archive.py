@@ -18,8 +18,9 @@ VERSION, UNIX, UTF8, DEFLATED = 20, 3, 0x800, 8
 TIME, DATE = 0, 0x21
 """1980-01-01, 00:00."""
 
-ITERATIONS = 3
-"""Searches for shorter compressed data; more bring some ten bytes."""
+ITERATIONS, BLOCKS = 3, 3
+"""Searches for shorter compressed data, and most blocks it is split into: more searches bring some ten bytes, more blocks
+0.8 % of the archive for four times the time."""
 
 
 def archive_bytes(files: Mapping[str, bytes]) -> bytes:
@@ -46,7 +47,7 @@ def archive_bytes(files: Mapping[str, bytes]) -> bytes:
 def _deflated(name: str, data: bytes) -> bytes:
     """Raw deflate data; for libraries and text of the model, most of an archive, the shortest that zopfli finds."""
     if name.startswith("binaries/") or name == "resources/rom.json":
-        stream: bytes = zopfli.zlib.compress(data, numiterations=ITERATIONS)
+        stream: bytes = zopfli.zlib.compress(data, numiterations=ITERATIONS, blocksplittingmax=BLOCKS)
         return stream[2:-4]  # without the header and the checksum of a zlib stream
     compressor = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     return compressor.compress(data) + compressor.flush()
