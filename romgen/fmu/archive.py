@@ -19,8 +19,8 @@ TIME, DATE = 0, 0x21
 """1980-01-01, 00:00."""
 
 ITERATIONS, BLOCKS = 3, 3
-"""Searches for shorter compressed data, and most blocks it is split into: more searches bring some ten bytes, more blocks
-0.8 % of the archive for four times the time."""
+"""Searches for shorter compressed data, and most blocks it is split into: more searches bring some ten bytes, more
+blocks 0.8 % of the archive for four times the time."""
 
 
 def archive_bytes(files: Mapping[str, bytes]) -> bytes:
