@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fem.anderson import Anderson
-from fem.arrays import FloatArray, IntArray
+from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError
 from fem.interface_equilibrium import LoosePoints
@@ -28,6 +28,7 @@ DIVERGED = 1e12
 """Residual over the peak inertia force beyond which iterating on is pointless and overflows single precision."""
 
 _Pair = tuple[FloatArray, FloatArray]
+_NONE: IntArray = np.array([], dtype=np.int64)
 
 ADVICE = "use a smaller time step, a smaller amplitude, or a start that has settled (snap-back)"
 
@@ -67,11 +68,13 @@ class Corrector:
         solve: Callable[[FloatArray, IntArray], FloatArray],
         anderson: Anderson,
         loose: LoosePoints | None = None,
+        anchored: IntArray = _NONE,
     ) -> SolvedStep:
         """Anderson-accelerated iteration on all cases together; each leaves when it has converged.
 
         ``solve`` preconditions residuals (n_dof, n_live) of the cases (n_live,). The remainders of the ``loose`` points
-        are unknowns beside the acceleration: mixed with the same weights, they stay those that it was made with.
+        are unknowns beside the acceleration: mixed with the same weights, they stay those that it was made with. Cases
+        that are ``anchored`` have factors of their own, to which the compliance of the points does not belong.
         """
         a, live = problem.guess, np.arange(problem.guess.shape[1])
         phi = _remainder(equation, problem, loose, a)
@@ -99,7 +102,7 @@ class Corrector:
             if loose is None or iteration == 0:
                 aim = phi
             else:
-                aim, force = _settled(equation, problem, loose, a, phi)
+                aim, force = _settled(equation, problem, loose, (a, phi), np.isin(live, anchored))
                 residual = residual + force
             correction = -solve(residual, live) * equation.dynamics.mask
             # The first correction of loose points only tells what remainders the second one starts from.
@@ -172,12 +175,17 @@ def _remainder(equation: StepEquation, problem: StepProblem, loose: LoosePoints 
 
 
 def _settled(
-    equation: StepEquation, problem: StepProblem, loose: LoosePoints, a: FloatArray, phi: FloatArray
+    equation: StepEquation, problem: StepProblem, loose: LoosePoints, now: _Pair, as_it_is: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Remainder at the equilibrium of the loose points, and what it adds to the residual at a (n_dof, n_case) N."""
+    """Remainder at the equilibrium of the loose points, and what it adds to the residual (n_dof, n_case) N.
+
+    now : acceleration and remainder; as_it_is : (n_case,) cases that keep the remainder of their acceleration.
+    """
+    a, phi = now
     v, slip = _relative(equation, problem, loose, a)
-    aim = loose.settled(v, phi, slip)
-    return aim, (1.0 - equation.scheme.alpha_f) * loose.force(aim - loose.remainder(v, slip))
+    own = loose.remainder(v, slip)
+    aim = np.where(as_it_is, own, loose.settled(v, phi, slip))
+    return aim, (1.0 - equation.scheme.alpha_f) * loose.force(aim - own) * equation.dynamics.mask
 
 
 def _newton_step(equation: StepEquation, problem: StepProblem, a: FloatArray, trial: Trial, solver: str) -> FloatArray:

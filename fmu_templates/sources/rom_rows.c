@@ -57,7 +57,7 @@ INLINE void add_product(lanes *sum, const lanes *a, const lanes *b, const double
 INLINE void parts_of(const double *C, size_t n_row, size_t n_all, const rom_blocks *blocks, const rom_pair *left,
                      const rom_pair *right, double part[][N_LANE])
 {
-    const lanes zero[N_GROUP] = {{0.0}};
+    static const lanes zero[N_GROUP]; /* all 0 */
     lanes total[N_GROUP];
     memcpy(total, zero, sizeof total);
     for (size_t b = 0; b < blocks->n_block; ++b, right += N_LANE) {

@@ -145,3 +145,19 @@ def test_slipping_steps_take_fewer_iterations_to_the_same_motion(strip: Strip) -
     shift = np.abs(strip.held.u - strip.equilibrium.u).max()
     np.testing.assert_allclose(motion[1], motion[0], atol=0.5 * 80**2 * 1e-5 * shift)
     assert iterations[1] < 0.9 * iterations[0]
+
+
+def test_a_case_with_its_own_factor_does_not_hold_up_the_others(strip: Strip) -> None:
+    """Two cases, the second anchored from the start: the first iterates as beside a plain one."""
+    transient = make_transient(strip, tolerance=1e-5, time_step=2e-4, refactor_above=0)
+    alone = released(strip, transient)
+    both = np.repeat(alone.u - strip.equilibrium.u[:, None], 2, axis=1)
+    start = transient.start(both, 0.0 * both, np.repeat(strip.held.contact.slip, 2, axis=2), settled=True)
+    case = np.array([1])
+    anchors = replace(start.pace, anchored=case, anchor_u=start.u[:, case], anchor_slip=start.slip[:, :, case])
+    counts = []
+    for state in (start, replace(start, pace=anchors)):
+        records = list(transient.march(state, 40))
+        counts.append(sum(int(r.iterations[0]) for r in records))
+        assert len(records[-1].state.pace.loose) > 0
+    assert counts[1] == pytest.approx(counts[0], rel=0.02)
