@@ -24,6 +24,7 @@ from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.compiled import compiled, inlined, threaded
 from fem.contact import Contact, ContactState
 from fem.friction import return_map, traction_tangents
+from fem.gmres import gmres
 from fem.sparse_product import SparseProduct
 
 LARGEST = 1500
@@ -39,7 +40,6 @@ GROUP = 10
 """Points whose forces are solved for together: always the same ones, so that a restart finds the same bits."""
 
 NEWTON_STEPS, NEWTON_TOLERANCE = 8, 1e-2
-KRYLOV_STEPS, KRYLOV_TOLERANCE = 40, 1e-2
 
 
 @dataclass(frozen=True)
@@ -222,59 +222,8 @@ def _newton_step(
         matrix[r, r] += 1.0
     step = -miss
     moved_by = np.zeros_like(miss)
-    _add_moved(compliance, weight, _gmres(matrix, right), rows, moved_by)
+    _add_moved(compliance, weight, gmres(matrix, right), rows, moved_by)
     return step - moved_by
-
-
-@compiled
-def _gmres(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """x with A x = b to a relative residual of KRYLOV_TOLERANCE.
-
-    Saad & Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856-869, algorithm 4 without restarts.
-    """
-    n = len(right)
-    size = np.sqrt(np.sum(right * right))
-    if size == 0.0:
-        return np.zeros(n)
-    most = min(KRYLOV_STEPS, n)
-    basis, upper = np.empty((most + 1, n)), np.zeros((most + 1, most))
-    cosines, sines, g = np.empty(most), np.empty(most), np.zeros(most + 1)
-    basis[0] = right / size
-    g[0] = size
-    used = 0
-    for k in range(most):
-        w = np.empty(n)
-        for i in range(n):
-            s = 0.0
-            for j in range(n):
-                s += matrix[i, j] * basis[k, j]
-            w[i] = s
-        for j in range(k + 1):
-            upper[j, k] = np.sum(w * basis[j])
-            w -= upper[j, k] * basis[j]
-        upper[k + 1, k] = np.sqrt(np.sum(w * w))
-        last = upper[k + 1, k]
-        for j in range(k):
-            a, b = upper[j, k], upper[j + 1, k]
-            upper[j, k], upper[j + 1, k] = cosines[j] * a + sines[j] * b, cosines[j] * b - sines[j] * a
-        length = np.sqrt(upper[k, k] ** 2 + last**2)
-        if length == 0.0:
-            break
-        cosines[k], sines[k] = upper[k, k] / length, last / length
-        upper[k, k] = length
-        g[k], g[k + 1] = cosines[k] * g[k], -sines[k] * g[k]
-        used = k + 1
-        if abs(g[k + 1]) <= KRYLOV_TOLERANCE * size or last == 0.0:
-            break
-        basis[k + 1] = w / last
-    x = np.zeros(n)
-    for k in range(used - 1, -1, -1):
-        y = g[k]
-        for j in range(k + 1, used):
-            y -= upper[k, j] * g[j]
-        g[k] = y / upper[k, k]
-        x += g[k] * basis[k]
-    return x
 
 
 @threaded

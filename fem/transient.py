@@ -258,8 +258,9 @@ class Transient:
             return self._corrector.newton(equation, problem, self.settings.solver)
         u = problem.u0 + equation.step**2 * self.scheme.beta * problem.guess
         solve = self._preconditioner.prepare(level, old.pace, u)
-        # The compliance of the points belongs to whole intervals.
-        loose = self.loose(old) if level == 0 else None
+        # The compliance of the points belongs to the shared factor for whole intervals.
+        shared = level == 0 and len(old.pace.anchored) < u.shape[1]
+        loose = self.loose(old) if shared else None
         return self._corrector.accelerated(equation, problem, solve, anderson, loose, old.pace.anchored)
 
     def _between(self, state: MotionState, new: MotionState, level: int, number: int) -> StepRecord:
