@@ -9,7 +9,7 @@ import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.etdrk4 import largest_step
-from romgen.fmu.factored import N_GROUP, N_LANE, GroupedForm, factored_model
+from romgen.fmu.factored import N_GROUP, N_LANE, FactoredModel, GroupedForm
 from romgen.fmu.magnitudes import nominal_displacement, nominal_velocity
 from romgen.fmu.programme import MonomialProgramme
 from romgen.fmu.records import PLAIN, InterfaceOptions
@@ -20,9 +20,8 @@ HARD_LIMIT = 3.0
 """Default of the parameter hard_limit, in distances of the trained range (``romgen.trained_range``)."""
 
 
-def coefficients_header(model: ReducedModel, options: InterfaceOptions = PLAIN) -> str:
+def coefficients_header(model: ReducedModel, factored: FactoredModel, options: InterfaceOptions = PLAIN) -> str:
     """The text of coefficients.h: small constant data only, decimal numbers that read back exactly."""
-    factored = factored_model(model)
     return "\n".join(
         [
             f"/* Coefficients of the reduced model {model.name}; generated, data only. */",
@@ -55,10 +54,15 @@ def tables_header(table: bytes) -> str:
     return "\n".join(["/* The large tables of the reduced model in the order of rom_tables; generated. */", text])
 
 
-def sizes_header(model: ReducedModel, guid: str, data: tuple[str, bytes], options: InterfaceOptions = PLAIN) -> str:
+def sizes_header(
+    model: ReducedModel,
+    factored: FactoredModel,
+    guid: str,
+    data: tuple[str, bytes],
+    options: InterfaceOptions = PLAIN,
+) -> str:
     """The text of model_sizes.h: identity and sizes of the model; ``data`` is coefficients.h and the large tables."""
     content_hash = hashlib.sha256(data[0].encode() + data[1]).hexdigest()
-    factored = factored_model(model)
     half, form, chart, sensor = factored.half, factored.form, factored.chart, factored.sensor
     sizes = {
         "N_MODE": len(model.eigenvalues),

@@ -16,6 +16,7 @@ from romgen.fmu.description import (
     model_description,
     tool_name,
 )
+from romgen.fmu.factored import factored_model
 from romgen.fmu.interface import build_interface
 from romgen.fmu.model_file import model_resources
 from romgen.fmu.records import PLAIN, FmuExport, FmuInfo, InterfaceOptions
@@ -67,8 +68,9 @@ def export_fmu(
 
 def generated_sources(model: ReducedModel, guid: str, options: InterfaceOptions = PLAIN) -> dict[str, bytes]:
     """All C files of a unit by name: the runtime, the FMI headers and the generated headers."""
-    coefficients, table = coefficients_header(model, options), table_bytes(model)
-    sizes = sizes_header(model, guid, (coefficients, table), options)
+    factored = factored_model(model)
+    coefficients, table = coefficients_header(model, factored, options), table_bytes(factored)
+    sizes = sizes_header(model, factored, guid, (coefficients, table), options)
     generated = {"coefficients.h": coefficients, "model_sizes.h": sizes}
     if not options.coefficients_in_file:
         generated["tables.h"] = tables_header(table)

@@ -13,6 +13,7 @@ import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError
+from romgen.fmu.factored import factored_model
 from romgen.fmu.programme import fold_conjugates
 from romgen.fmu.tables import TABLE_FILE, TABLE_LAYOUT, table_bytes, with_table
 from romgen.polynomial import PolynomialMap
@@ -27,7 +28,7 @@ def model_resources(model: ReducedModel, *, in_file: bool) -> dict[str, bytes]:
     """Files of a unit that hold its model, by path: rom.json alone, or with the large tables in coefficients.bin."""
     if not in_file:
         return {JSON_PATH: model_json(model).encode()}
-    return {JSON_PATH: _text(_content(model, TABLE_FILE)).encode(), TABLE_PATH: table_bytes(model)}
+    return {JSON_PATH: _text(_content(model, TABLE_FILE)).encode(), TABLE_PATH: table_bytes(factored_model(model))}
 
 
 def model_in_unit(path: Path) -> ReducedModel | None:

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from romgen.arrays import FloatArray, IntArray
-from romgen.fmu.factored import factored_model
+from romgen.fmu.factored import FactoredModel, factored_model
 from romgen.fmu.real_chart import complex_chart
 from romgen.polynomial import PolynomialMap
 from romgen.reduced_model import ReducedModel
@@ -20,13 +20,12 @@ FNV_OFFSET, FNV_PRIME = 14695981039346656037, 1099511628211
 """Fowler, Noll and Vo's hash with 64 bits, here of words instead of bytes."""
 
 
-def table_bytes(model: ReducedModel) -> bytes:
+def table_bytes(factored: FactoredModel) -> bytes:
     """Struct ``rom_tables`` of the C runtime as little-endian doubles: normal form, chart, sensors.
 
     The normal form holds its terms group by group as (re, im), one zero where there is none; chart, displacements and
     velocities come in the order of ``HalvedMap.packed``.
     """
-    factored = factored_model(model)
     terms = factored.form.coefficients if len(factored.form.coefficients) else np.zeros(1, dtype=np.complex128)
     chart = factored.chart.packed(factored.chart_map.coefficients)
     sensors = [factored.sensor.packed(rows) for rows in np.split(factored.sensor_map.coefficients, 2)]
