@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from romgen.arrays import FloatArray
+from romgen.arrays import BoolArray, FloatArray
 from romgen.differences import DROPPED, first_derivative, is_uniform, resample, second_derivative
 from romgen.errors import InputError
 from romgen.trajectory import Trajectory
@@ -32,6 +32,11 @@ class ReducedTrajectory:
     y_dot: FloatArray = field(metadata={"unit": "mixed", "axes": "time,coordinate"})
     displacement: FloatArray = field(metadata={"unit": "m", "axes": "time,sensor"})
     velocity: FloatArray = field(metadata={"unit": "m/s", "axes": "time,sensor"})
+
+    def masked(self, keep: BoolArray) -> ReducedTrajectory:
+        """Return the samples where ``keep`` (n_time,) is True."""
+        arrays = self.t, self.y, self.y_dot, self.displacement, self.velocity
+        return ReducedTrajectory(self.name, *(x[keep] for x in arrays))
 
 
 @dataclass(frozen=True)

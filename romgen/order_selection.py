@@ -21,7 +21,7 @@ from romgen.reduced_model import ReducedModel
 from romgen.settings import LearnSettings
 from romgen.simulate import coordinates, simulate
 from romgen.stability import tried_stability
-from romgen.trajectory_fit import growing_fits, is_long_enough, masked
+from romgen.trajectory_fit import growing_fits, is_long_enough
 
 CANDIDATES = (3, 5, 7)
 # Alternate blocks train and test; eight per trajectory leave several beats of two modes in each.
@@ -183,7 +183,7 @@ def _held_out_errors(
 ) -> list[float]:
     """Return the NMTE in percent, at most 100, of each held-out block within the amplitudes of the kept samples."""
     pairs = list(zip(training, kept, strict=True))
-    largest = np.max([modal_amplitudes(fit, masked(r, keep)) for r, keep in pairs], axis=0)
+    largest = np.max([modal_amplitudes(fit, r.masked(keep)) for r, keep in pairs], axis=0)
     errors = []
     for r, keep in pairs:
         norms = np.linalg.norm(r.y / fit.dynamics.scale, axis=1)
@@ -203,7 +203,7 @@ def _folds(training: Sequence[ReducedTrajectory]) -> list[list[BoolArray]]:
 def _runs(r: ReducedTrajectory, keep: BoolArray) -> list[ReducedTrajectory]:
     """Return the blocks of a trajectory where ``keep`` is True."""
     block = np.arange(len(r.t)) * BLOCKS // len(r.t)
-    return [masked(r, block == k) for k in range(BLOCKS) if keep[np.argmax(block == k)]]
+    return [r.masked(block == k) for k in range(BLOCKS) if keep[np.argmax(block == k)]]
 
 
 def modal_amplitudes(fit: NormalFormFit, r: ReducedTrajectory) -> FloatArray:

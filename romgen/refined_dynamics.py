@@ -47,7 +47,8 @@ class RefinedDynamics:
 
     Attributes
     ----------
-    eigenvalues : (m,) Lambda, 1/s; reference : (m,) the values they are tied to; keep_linear : they stay there.
+    eigenvalues : (m,) Lambda, 1/s; keep_linear : they stay as they are.
+    reference, spread : (m,) the values that they are tied to; standard deviations of Re and Im by which they are known.
     amplitude : (m,) corner of the data, largest abs(z_j) over all motions.
     exponents : (n_term, 2m) degree >= 2; resonant : (m, n_term) terms of B; B : (m, n_term) 1/s.
     output : terms of the displacement; C : (m, n_output) their coefficients; rest : (n_motion, m) rest positions.
@@ -57,6 +58,7 @@ class RefinedDynamics:
 
     eigenvalues: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
     reference: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
+    spread: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
     amplitude: FloatArray = field(metadata={"unit": "1", "axes": "mode"})
     exponents: IntArray = field(metadata={"unit": "1", "axes": "term,variable"})
     resonant: BoolArray = field(metadata={"unit": "1", "axes": "mode,term"})

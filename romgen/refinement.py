@@ -158,8 +158,10 @@ def _prior(model: RefinedDynamics) -> tuple[FloatArray, FloatArray]:
     corner = np.prod(np.concatenate([model.amplitude, model.amplitude]) ** E, axis=1) / model.amplitude[rows]
     own = (E[:, :m] - E[:, m:] == np.eye(m, dtype=np.int64)[rows]).all(axis=1)
     rate = corner / omega[rows]
-    real = np.concatenate([1.0 / (PRIOR_REAL * model.reference.real), rate / np.where(own, PRIOR_DAMPING, PRIOR_RATE)])
-    imag = np.concatenate([1.0 / (PRIOR_IMAG * omega), rate / PRIOR_RATE])
+    known = np.maximum(PRIOR_REAL * np.abs(model.reference.real), model.spread.real)
+    real = np.concatenate([1.0 / known, rate / np.where(own, PRIOR_DAMPING, PRIOR_RATE)])
+    known = np.maximum(PRIOR_IMAG * omega, model.spread.imag)
+    imag = np.concatenate([1.0 / known, rate / PRIOR_RATE])
     values = np.concatenate([model.eigenvalues - model.reference, model.B[rows, terms]])
     weight = (PRIOR_ERROR * np.column_stack([real, imag]).ravel()) ** 2
     return weight, np.column_stack([values.real, values.imag]).ravel()

@@ -14,9 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from romgen.arrays import BoolArray, ComplexArray
+from romgen.arrays import BoolArray, ComplexArray, IntArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import DROPPED, first_derivative
+from romgen.jackknife import blocks_of
 from romgen.metrics import analytic_signal
 from romgen.normal_form import NormalFormFit
 from romgen.output_map import output_map
@@ -31,8 +32,6 @@ BAND = (0.5, 1.5)
 # z'/z counts alike at all amplitudes above this share of the largest: phase drift is what the start must get right.
 AMPLITUDE_FLOOR = 0.06
 EDGE_PERIODS = 1.0
-# Small: every mode below this share of its largest amplitude, for so many periods of the slowest mode together.
-SMALL, SMALL_PERIODS = 0.15, 20.0
 SAMPLES_PER_PERIOD = 6.0
 
 
@@ -79,17 +78,18 @@ def start_model(
     training: Sequence[ReducedTrajectory],
     kept: Sequence[BoolArray],
     table: ResonanceTable,
+    tie: tuple[ComplexArray, ComplexArray],
     *,
     keep_linear: bool,
 ) -> RefinedDynamics:
     """Return Lambda and B of the signals, the linear displacement of the modes, and no further terms.
 
-    Lambda is tied to the linear part of the direct fit, or to small amplitudes of the band-passed signals;
-    ``keep_linear`` keeps the eigenvalues of the start here and in the refinement.
+    Parameters
+    ----------
+    kept : (n_time,) per trajectory, samples that count.
+    tie : (m,) what the eigenvalues are tied to in the refinement, and its standard deviations.
+    keep_linear : keep the eigenvalues of the start here and in the refinement.
     """
-    reference = start.dynamics.eigenvalues
-    if start.direct is None:
-        reference = small_eigenvalues(start, training, kept, table, keep_linear=keep_linear)[0]
     dynamics, m = start.dynamics, len(start.dynamics.eigenvalues)
     eigenvalues, B = rates(start, training, kept, table, keep_linear=keep_linear)
     # w = 2 Re(V q), so eta_j = s_j Re(2 V_jj z_j) and the rest
@@ -97,7 +97,8 @@ def start_model(
     output = output_map(linear.astype(np.complex128), table)
     return RefinedDynamics(
         eigenvalues=eigenvalues,
-        reference=reference,
+        reference=tie[0],
+        spread=tie[1],
         keep_linear=keep_linear,
         amplitude=np.max([np.abs(z[keep]).max(axis=0) for z, keep in zip(start.signals, kept, strict=True)], axis=0),
         exponents=table.exponents,
@@ -118,36 +119,13 @@ def rates(
     keep_linear: bool,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return Lambda and B of z' = Lambda z + B phi(z) by regression with weights 1/(abs(z_j) + floor)."""
-    return _regression(start, _samples(start, training, kept), table, keep_linear=keep_linear)
+    return regression(start, samples(start, training, kept)[:2], table, keep_linear=keep_linear)
 
 
-def small_eigenvalues(
-    start: Start,
-    training: Sequence[ReducedTrajectory],
-    kept: Sequence[BoolArray],
-    table: ResonanceTable,
-    *,
-    keep_linear: bool,
-) -> tuple[ComplexArray, bool]:
-    """Return Lambda (m,) by the regression of ``rates`` over the samples in which all modes are small, and True.
-
-    Over all amplitudes the linear part of a polynomial of low degree bends towards the large ones. Band-passed signals
-    have no rest position in them, which counts where motions are small. Motions that end before SMALL_PERIODS, or that
-    do not decay there, leave the regression over all samples, and False.
-    """
-    Z, Z_dot = _samples(start, training, kept)
-    small = (np.abs(Z) <= SMALL * np.abs(Z).max(axis=0)).all(axis=1)
-    slowest = 2.0 * np.pi / float(start.dynamics.eigenvalues.imag.min())
-    if small.sum() * min(float(r.t[1] - r.t[0]) for r in training) >= SMALL_PERIODS * slowest:
-        eigenvalues = _regression(start, (Z[small], Z_dot[small]), table, keep_linear=keep_linear)[0]
-        if np.all(eigenvalues.real < 0.0):
-            return eigenvalues, True
-    return _regression(start, (Z, Z_dot), table, keep_linear=keep_linear)[0], False
-
-
-def _regression(
+def regression(
     start: Start, samples: tuple[ComplexArray, ComplexArray], table: ResonanceTable, *, keep_linear: bool
 ) -> tuple[ComplexArray, ComplexArray]:
+    """Return Lambda and B from z and z' (n_sample, m)."""
     Z, Z_dot = samples
     B = np.zeros(table.resonant.shape, dtype=np.complex128)
     eigenvalues = start.dynamics.eigenvalues.copy()
@@ -163,19 +141,22 @@ def _regression(
     return eigenvalues, B
 
 
-def _samples(
+def samples(
     start: Start, training: Sequence[ReducedTrajectory], kept: Sequence[BoolArray]
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return z and z' (n_sample, m) of the samples that count and are not distorted."""
-    z, rate = [], []
-    for r, signal, edge, keep in zip(training, start.signals, start.edge, kept, strict=True):
+) -> tuple[ComplexArray, ComplexArray, IntArray]:
+    """Return z, z' (n_sample, m) and number of the block of the samples that count and are not distorted."""
+    z, rate, block = [], [], []
+    ends = np.cumsum([len(r.t) for r in training])[:-1]
+    own = np.split(blocks_of(training), ends)
+    for r, signal, edge, keep, number in zip(training, start.signals, start.edge, kept, own, strict=True):
         inner = keep[DROPPED:-DROPPED].copy()
         inner[:edge], inner[len(inner) - edge :] = False, False
         m = signal.shape[1]
         derivative = first_derivative(np.hstack([signal.real, signal.imag]), float(r.t[1] - r.t[0]))
         z.append(signal[DROPPED:-DROPPED][inner])
         rate.append((derivative[:, :m] + 1j * derivative[:, m:])[inner])
-    return np.vstack(z), np.vstack(rate)
+        block.append(number[DROPPED:-DROPPED][inner])
+    return np.vstack(z), np.vstack(rate), np.concatenate(block)
 
 
 def segments(

@@ -11,14 +11,16 @@ from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import is_uniform
 from romgen.dissipative_fit import dissipative
-from romgen.jackknife import Replicates, blocks_of
-from romgen.normal_form import FitOrigin, NormalFormFit, Resonance, fit_normal_form, resonance_table, with_replicates
+from romgen.errors import NumericalError
+from romgen.jackknife import Replicates
+from romgen.linear_reference import LinearReference, linear_reference
+from romgen.normal_form import FitOrigin, NormalFormFit, Resonance, fit_normal_form, resonance_table
 from romgen.reduced_dynamics import LinearPart
 from romgen.refined_chart import refined_normal_form
 from romgen.refined_dynamics import RefinedDynamics, Segment
 from romgen.refinement import refine, regrown, replicates
 from romgen.resonance import ResonanceTable
-from romgen.shooting_start import Start, band_passed, charted, segments, small_eigenvalues, start_model
+from romgen.shooting_start import Start, band_passed, charted, segments, start_model
 
 START_ORDER = 3
 MIN_PERIODS = 20.0
@@ -64,16 +66,14 @@ def fit_on_trajectories(
 
     Raises
     ------
-    NumericalError : the linear part does not decay.
+    NumericalError : the linear part does not decay, or no start stays bounded.
     """
     everything = [np.ones(len(r.t), dtype=bool) for r in training]
     last = next(_grown(training, everything, (order,), (internal_resonance, ridge, known)))
-    table = resonance_table(last.start.dynamics.eigenvalues, min(order, START_ORDER), internal_resonance)
-    references = _references(training, last.start, table, (ridge, known is not None))
-    others = replicates(last.model, last.segments, last.max_step, references)
+    others = replicates(last.model, last.segments, last.max_step, last.reference.without)
     spread = Replicates(np.array([o.eigenvalues for o in others]), np.array([o.B for o in others]))
-    origin = _origin(training, last.start, table, keep_linear=known is not None)
-    return replace(last.normal_form(ridge), replicates=spread, origin=origin)
+    begun = "band-passed signals" if last.start.direct is None else "the direct fit"
+    return replace(last.normal_form(ridge), replicates=spread, origin=FitOrigin(begun, last.reference.origin))
 
 
 def growing_orders(order: int) -> list[int]:
@@ -114,6 +114,7 @@ class _Refined:
     """What refinement has reached at one order."""
 
     start: Start
+    reference: LinearReference
     model: RefinedDynamics
     segments: tuple[Segment, ...]
     table: ResonanceTable
@@ -131,7 +132,7 @@ def _grown(
 ) -> Iterator[_Refined]:
     internal_resonance = settings[0]
     grown = sorted({*growing_orders(orders[0]), *orders})
-    start, shooting, shots = _best_start(training, kept, (min(grown[0], START_ORDER), grown[0]), settings)
+    (start, reference), shooting, shots = _best_start(training, kept, (min(grown[0], START_ORDER), grown[0]), settings)
     dynamics = start.dynamics
     whole = segments(start, training, kept, 1)
     first = [next(k for k, s in enumerate(shots) if s.motion == number) for number in range(len(training))]
@@ -146,7 +147,7 @@ def _grown(
             whole = tuple(replace(s, z0=shots[k].z0) for s, k in zip(whole, first, strict=True))
         model, whole = refine(regrown(model, table), whole, max_step, STEPS, DECREASE)
         if order in orders:
-            yield _Refined(start, *dissipative(model, whole, max_step), table, max_step)
+            yield _Refined(start, reference, *dissipative(model, whole, max_step), table, max_step)
 
 
 def _best_start(
@@ -154,7 +155,7 @@ def _best_start(
     kept: Sequence[BoolArray],
     orders: tuple[int, int],
     settings: tuple[Resonance, float, LinearPart | None],
-) -> tuple[Start, RefinedDynamics, tuple[Segment, ...]]:
+) -> tuple[tuple[Start, LinearReference], RefinedDynamics, tuple[Segment, ...]]:
     """Return the start from which multiple shooting comes to the lower cost on the samples that count.
 
     The direct fit must win by a tenth: band-passed signals know the limit of small motions, which a cost of low order
@@ -165,16 +166,24 @@ def _best_start(
     orders : of the direct fit, which has the linear part of all starts; of the refinement.
     """
     internal_resonance, ridge, known = settings
-    seen = [masked(r, keep) for r, keep in zip(training, kept, strict=True)]
+    seen = [r.masked(keep) for r, keep in zip(training, kept, strict=True)]
     direct = fit_normal_form(seen, orders[0], internal_resonance, ridge, known)
     table = resonance_table(direct.dynamics.eigenvalues, orders[1], internal_resonance)
     max_step = largest_resonant_step(direct.dynamics.eigenvalues, table)
     found = []
     for start in (band_passed(direct.dynamics, training), charted(direct, training)):
-        model = start_model(start, training, kept, table, keep_linear=known is not None)
+        reference = linear_reference(start, training, kept, table, (ridge, known is not None))
+        tie = reference.eigenvalues, reference.spread
+        model = start_model(start, training, kept, table, tie, keep_linear=known is not None)
         shots = segments(start, training, kept, SHOTS)
-        found.append((start, *refine(model, shots, max_step, SHOT_STEPS, SHOT_DECREASE)))
+        found.append(((start, reference), *refine(model, shots, max_step, SHOT_STEPS, SHOT_DECREASE)))
     band, direct_start = found
+    if not np.isfinite([band[1].cost, direct_start[1].cost]).any():
+        raise NumericalError(
+            "all starts of the fit on trajectories blow up",
+            where="learn",
+            advice="lower the order, give longer decays, or leave out motions that exchange energy faster",
+        )
     return direct_start if direct_start[1].cost < IMPROVED * band[1].cost else band
 
 
@@ -186,34 +195,3 @@ def largest_resonant_step(eigenvalues: ComplexArray, table: ResonanceTable) -> f
     turn = float(np.abs(table.detuning[table.resonant]).max(initial=0.0))
     shortest = 2.0 * np.pi / float(eigenvalues.imag.max()) / STEPS_PER_PERIOD
     return min(shortest, LARGEST_TURN / max(turn, np.finfo(float).tiny))
-
-
-def masked(r: ReducedTrajectory, keep: BoolArray) -> ReducedTrajectory:
-    """Return the samples of a trajectory where ``keep`` (n_time,) is True."""
-    return ReducedTrajectory(r.name, r.t[keep], r.y[keep], r.y_dot[keep], r.displacement[keep], r.velocity[keep])
-
-
-def _references(
-    training: Sequence[ReducedTrajectory], start: Start, table: ResonanceTable, settings: tuple[float, bool]
-) -> ComplexArray:
-    """Return what the eigenvalues are tied to without each block, (n_block, m): it comes from the same data."""
-    ridge, keep_linear = settings
-    if start.direct is not None:
-        others = with_replicates(start.direct, training, ridge, keep_linear=keep_linear).replicates
-        assert others is not None
-        return others.eigenvalues
-    block = blocks_of(training)
-    ends = np.cumsum([len(r.t) for r in training])[:-1]
-    kept = [np.split(block != b, ends) for b in range(block.max() + 1)]
-    return np.array([small_eigenvalues(start, training, masks, table, keep_linear=keep_linear)[0] for masks in kept])
-
-
-def _origin(
-    training: Sequence[ReducedTrajectory], start: Start, table: ResonanceTable, *, keep_linear: bool
-) -> FitOrigin:
-    if start.direct is not None:
-        return FitOrigin("the direct fit", "given" if keep_linear else "the direct fit")
-    everything = [np.ones(len(r.t), dtype=bool) for r in training]
-    small = small_eigenvalues(start, training, everything, table, keep_linear=keep_linear)[1]
-    linear = "small motions" if small else "all amplitudes"
-    return FitOrigin("band-passed signals", "given" if keep_linear else linear)

@@ -19,7 +19,7 @@ from romgen.normal_form import NormalFormFit, fit_normal_form, with_replicates
 from romgen.order_selection import autonomous_model
 from romgen.reduced_dynamics import LinearPart
 from romgen.simulate import simulate
-from romgen.trajectory_fit import fit_on_trajectories, masked
+from romgen.trajectory_fit import fit_on_trajectories
 from tests.normal_form_models import damped_oscillator
 
 DAMPING, CUBIC = 0.01, 0.2
@@ -108,7 +108,7 @@ def test_replicates_of_a_direct_fit_are_refits() -> None:
     first = len(training[0].t)
     for block in (0, 9, 20):
         masks = np.split(of != block, [first, 2 * first])
-        refit = fit_normal_form([masked(r, keep) for r, keep in zip(training, masks, strict=True)], 3, (), RIDGE)
+        refit = fit_normal_form([r.masked(keep) for r, keep in zip(training, masks, strict=True)], 3, (), RIDGE)
         # |z|^2 z is in units of the scale of z, set by the largest amplitude of the data: back to that of the full fit
         unit = np.abs(refit.dynamics.vectors[0] * refit.dynamics.scale[0]) / np.abs(
             fit.dynamics.vectors[0] * fit.dynamics.scale[0]

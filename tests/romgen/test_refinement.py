@@ -37,7 +37,18 @@ def known() -> RefinedDynamics:
     own = (output.exponents[:, :2] == output.exponents[:, 2:]).all(axis=1)
     C[:, own] = C[:, own].real
     amplitude = np.array([0.5, 0.5])
-    return RefinedDynamics(LAMBDA, LAMBDA, amplitude, table.exponents, table.resonant, B, output, C, np.zeros((2, 2)))
+    return RefinedDynamics(
+        LAMBDA,
+        LAMBDA,
+        np.zeros(2, dtype=complex),
+        amplitude,
+        table.exponents,
+        table.resonant,
+        B,
+        output,
+        C,
+        np.zeros((2, 2)),
+    )
 
 
 def data(model: RefinedDynamics, kept: BoolArray | None = None, shots: int = 1) -> tuple[Segment, ...]:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from romgen import trajectory_fit
+from romgen import refinement, trajectory_fit
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import first_derivative
+from romgen.errors import NumericalError
 from romgen.etdrk4 import march
 from romgen.learning_notes import learning_notes
+from romgen.linear_reference import LinearReference, linear_reference
 from romgen.normal_form import FitOrigin, fit_normal_form, resonance_table
 from romgen.order_selection import motion_error
-from romgen.shooting_start import band_passed, rates, small_eigenvalues
+from romgen.shooting_start import band_passed, rates
 from romgen.trajectory_fit import fit_on_trajectories
 from tests.romgen.fmu.models import random_model
 
@@ -33,11 +35,11 @@ def motion(z: ComplexArray, rest: FloatArray) -> ReducedTrajectory:
 
 
 def exchanging() -> list[ReducedTrajectory]:
-    """1:2 resonance in which nearly all energy changes the mode within three periods; orders 2 and 3."""
+    """1:2 resonance in which nearly all energy changes the mode within two periods; orders 2 and 3."""
     table = resonance_table(LAMBDA, 3, (1, 2))
     E, B = table.exponents, np.zeros(table.resonant.shape, dtype=np.complex128)
     # conj(z_1) z_2 and z_1^2 keep abs(z_1)^2 + 2 abs(z_2)^2
-    B[0, (E == [0, 1, 1, 0]).all(axis=1)], B[1, (E == [2, 0, 0, 0]).all(axis=1)] = 40.0j, 20.0j
+    B[0, (E == [0, 1, 1, 0]).all(axis=1)], B[1, (E == [2, 0, 0, 0]).all(axis=1)] = 60.0j, 30.0j
     B[0, (E == [2, 0, 1, 0]).all(axis=1)], B[1, (E == [0, 2, 0, 1]).all(axis=1)] = -10.0j, 5.0j
     t = STEP * np.arange(1601)
     still = np.zeros((1600, 2), dtype=np.complex128)
@@ -56,6 +58,12 @@ def test_fast_exchange_is_refined_from_the_direct_fit(monkeypatch: pytest.Monkey
     assert errors[1] < min(errors[0], errors[2])
 
 
+def test_starts_that_all_blow_up_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(refinement, "FAR", 0.1)
+    with pytest.raises(NumericalError, match="blow up"):
+        fit_on_trajectories(exchanging(), 3, (1, 2), 1e-8)
+
+
 def test_small_motions_give_the_linear_part_that_a_polynomial_over_all_amplitudes_bends() -> None:
     """Frequency 60 - 8 sqrt(abs(z_1)) rad/s, which no polynomial follows, and a motion that comes to rest elsewhere.
 
@@ -71,12 +79,37 @@ def test_small_motions_give_the_linear_part_that_a_polynomial_over_all_amplitude
     kept = [np.ones(len(r.t), dtype=bool)]
     start = band_passed(fit_normal_form([r], 3, (1, 2), 1e-8).dynamics, [r])
     table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
-    small, is_small = small_eigenvalues(start, [r], kept, table, keep_linear=False)
+    reference = linear_reference(start, [r], kept, table, (1e-8, False))
+    small = reference.eigenvalues
     everything = rates(start, [r], kept, table, keep_linear=False)[0]
-    assert is_small
+    assert reference.origin == "small motions"
     assert 60.0 - 8.0 * np.sqrt(0.06) < small[0].imag < 60.0
     assert abs(small[0].imag - 60.0) < 1.5 * np.sqrt(0.15) * abs(everything[0].imag - 60.0)
     assert small[0].real == pytest.approx(-0.9, rel=0.05)
+
+
+def test_motions_that_disagree_about_the_limit_of_small_motions_loosen_the_tie() -> None:
+    """Frequencies 60 and 60.3 rad/s: the mean over eight blocks of each is known to 0.3 / 2 / sqrt(15) = 0.039 rad/s.
+
+    Var = (G - 1) / G sum (w_b - w)^2 with w_b = w +- 0.15 / (G - 1), G = 16, if all blocks weigh alike; only the blocks
+    with small samples count, four or more of each motion: 0.15 / sqrt(G - 1) lies between 0.039 and 0.057 then, and
+    blocks that weigh unequally add to it.
+    """
+    t = STEP * np.arange(3001)
+
+    def found(frequencies: tuple[float, float]) -> LinearReference:
+        motions = [
+            motion(np.exp(np.outer(t, [-0.9 + 1j * omega, -1.5 + 121.0j])) * [0.4, 0.3], np.zeros(2))
+            for omega in frequencies
+        ]
+        start = band_passed(fit_normal_form(motions, 3, (1, 2), 1e-8).dynamics, motions)
+        table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
+        return linear_reference(start, motions, [np.ones(len(r.t), dtype=bool) for r in motions], table, (1e-8, False))
+
+    differing, same = found((60.0, 60.3)), found((60.15, 60.15))
+    assert differing.eigenvalues[0].imag == pytest.approx(60.15, abs=0.05)
+    assert 0.03 < differing.spread[0].imag < 0.08
+    assert same.spread[0].imag < 0.1 * differing.spread[0].imag
 
 
 def test_motions_that_end_while_they_are_large_tie_the_linear_part_to_all_amplitudes() -> None:
@@ -86,8 +119,8 @@ def test_motions_that_end_while_they_are_large_tie_the_linear_part_to_all_amplit
     kept = [np.ones(len(r.t), dtype=bool)]
     start = band_passed(fit_normal_form([r], 3, (1, 2), 1e-8).dynamics, [r])
     table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
-    found, is_small = small_eigenvalues(start, [r], kept, table, keep_linear=False)
-    assert not is_small
-    assert np.array_equal(found, rates(start, [r], kept, table, keep_linear=False)[0])
+    reference = linear_reference(start, [r], kept, table, (1e-8, False))
+    assert reference.origin == "all amplitudes"
+    assert np.array_equal(reference.eigenvalues, rates(start, [r], kept, table, keep_linear=False)[0])
     notes = learning_notes([], None, random_model(), [], FitOrigin("band-passed signals", "all amplitudes"))
     assert "record longer ring-downs" in notes[0]
