@@ -16,6 +16,7 @@ from fem.modes import rest_state
 from fem.newton import internal_force
 from fem.preload import StaticState
 from fem.rigid_motion import check_restraint
+from fem.roundoff import STALLED, rounding_force
 
 _GROW, _SHRINK = 1.5, 0.5
 _EASY, _HARD = 4, 7
@@ -176,6 +177,7 @@ class _Path:
         """One step of given arc length; None where the corrector does not converge."""
         model, slip = self._model, here.contact.slip
         u, factor = here.u + length * here.du, here.factor + length * here.dfactor
+        last = float("inf")
         for iteration in range(self._settings.max_iterations):
             force, contact = internal_force(model, u, slip)
             residual = np.where(model.free, factor * self._load - force, 0.0)
@@ -183,10 +185,11 @@ class _Path:
             if not np.isfinite(size):
                 return None
             to_residual, to_load = self._solve(u, slip, [residual, self._load])
-            if iteration > 0 and size <= self._settings.tolerance * self._size:
+            if iteration > 0 and self._is_balanced(size, last, u, slip):
                 du, dfactor = self._unit(to_load, 1.0)
                 sign = 1.0 if self._dot(du, dfactor, here.du, here.dfactor) >= 0.0 else -1.0
                 return _Point(u, factor, contact, sign * du, sign * dfactor), iteration
+            last = size
             # Stay on the plane across the tangent: du . du_0 / u_1^2 + dlambda dlambda_0 = 0.
             across = here.du @ to_load / self._scale**2 + here.dfactor
             change = -float(here.du @ to_residual / self._scale**2 / across)
@@ -197,14 +200,15 @@ class _Path:
         """The point with lambda = 1 between two others, by Newton at that load."""
         share = (1.0 - here.factor) / (there.factor - here.factor)
         model, slip = self._model, here.contact.slip
-        u = here.u + share * (there.u - here.u)
+        u, last = here.u + share * (there.u - here.u), float("inf")
         for _ in range(self._settings.max_iterations):
             force, contact = internal_force(model, u, slip)
             residual = np.where(model.free, self._load - force, 0.0)
             to_residual, to_load = self._solve(u, slip, [residual, self._load])
-            if float(np.linalg.norm(residual)) <= self._settings.tolerance * self._size:
+            size = float(np.linalg.norm(residual))
+            if self._is_balanced(size, last, u, slip):
                 return _Point(u, 1.0, contact, *self._unit(to_load, 1.0))
-            u = u + to_residual
+            u, last = u + to_residual, size
         raise FemConvergenceError(
             "no equilibrium at the full load", where="arc length", value=f"after {here.factor:.6g}"
         )
@@ -233,6 +237,13 @@ class _Path:
             else:
                 high, rate_high = length, point.dfactor
         return best
+
+    def _is_balanced(self, size: float, last: float, u: FloatArray, slip: FloatArray) -> bool:
+        """Whether a residual of ``size`` N, after ``last``, is within the tolerance or all that rounding leaves."""
+        if size <= self._settings.tolerance * self._size:
+            return True
+        stalled = STALLED * last < size < last / STALLED
+        return stalled and size <= rounding_force(self._model, u, slip[:, :, 0])
 
     def _solve(self, u: FloatArray, slip: FloatArray, right: list[FloatArray]) -> list[FloatArray]:
         """Tangent answers to several loads."""

@@ -22,6 +22,7 @@ from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.rigid_motion import loose_bodies, loose_motion
+from fem.roundoff import STALLED, rounding_force
 from fem.tangent_solver import TangentSolver
 
 _ROUNDOFF = 1e-14
@@ -119,12 +120,14 @@ class LoadStep:
         limit = self._tolerance
         point = self._at(u, shortening)
         driven = bool(self.target.moved.any())
+        last = float("inf")
         for iteration in range(limit.max_iterations):
             driving = driven and iteration == 0
             norm = point.size / limit.scale
             limit.history.append(norm)
-            if norm <= limit.residual and not driving:
+            if not driving and (norm <= limit.residual or self._is_rounding(point, last)):
                 return point
+            last = point.size
             if not np.isfinite(norm):
                 return None
             closing = self._must_close(point, iteration)
@@ -133,6 +136,12 @@ class LoadStep:
             point = self._iterate(point, tried, driving=driving, closing=closing)
             self._last = point.contact
         return None
+
+    def _is_rounding(self, point: Point, last: float) -> bool:
+        """Whether the residual has stalled, after ``last`` N, at what rounding leaves of it."""
+        if not STALLED * last < point.size < last / STALLED:
+            return False
+        return point.size <= rounding_force(self.model, point.u, self._slip[:, :, 0])
 
     def _at(self, u: FloatArray, shortening: FloatArray) -> Point:
         model, target = self.model, self.target

@@ -47,7 +47,8 @@ class StaticSettings:
     Attributes
     ----------
     steps : equal load steps; a step that fails is halved, up to ``cuts`` times.
-    tolerance : residual relative to the load; max_iterations : per step; solver : linear solver by name.
+    tolerance : residual relative to the load, or what rounding leaves of it, see ``roundoff``.
+    max_iterations : per step; solver : linear solver by name.
     """
 
     steps: int = 4

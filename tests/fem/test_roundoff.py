@@ -1,0 +1,69 @@
+"""Residuals that rounding keeps above the tolerance: thin parts under small loads come to an end all the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fem
+from fem.newton import internal_force
+from fem.roundoff import rounding_force
+
+LENGTH, THICKNESS = 0.3, 0.0005
+CELLS = 24
+
+
+def thin_strip() -> fem.Model:
+    """300 x 0.5 mm under its own weight: the tip sinks by 35 times the thickness."""
+    steel = fem.Material(young_modulus=200e9, poisson_ratio=0.0, density=7800.0)
+    lines = np.linspace(0.0, LENGTH, CELLS + 1), np.array([0.0, THICKNESS]), np.array([0.0, 0.02])
+    return fem.build_model(
+        [fem.Body("strip", fem.hex_block(*lines), steel)],
+        supports=[fem.Support("strip.x_min", ("x", "y", "z"))],
+        loads=[fem.Gravity("weight", (0.0, -9.81, 0.0))],
+    )
+
+
+def residual(model: fem.Model, state: fem.StaticState) -> float:
+    slip = model.contact.no_slip(1)
+    return float(np.linalg.norm((model.load - internal_force(model, state.u, slip)[0])[model.free]))
+
+
+def test_thin_strip_comes_to_rest_at_what_rounding_leaves() -> None:
+    """The default tolerance of 1e-8 is out of reach here; a looser one that is in reach has the same answer."""
+    model = thin_strip()
+    state = fem.solve_static(model, model.load, fem.StaticSettings(steps=1))
+    left = residual(model, state)
+    bound = rounding_force(model, state.u, model.contact.no_slip(1)[:, :, 0])
+    assert 1e-8 * np.linalg.norm(model.load) < left <= bound
+    loose = fem.solve_static(model, model.load, fem.StaticSettings(steps=1, tolerance=1e-4))
+    tip = np.abs(state.u).max()
+    assert tip == pytest.approx(np.abs(loose.u).max(), rel=1e-4)
+    # straight beam: q L^4 / (8 E I) = 18.6 mm; turning by up to 5 degrees takes 1 %, cells 50 times as long as thick 5 %
+    straight = 7800.0 * 9.81 * LENGTH**4 / (8.0 * 200e9 * THICKNESS**2 / 12.0)
+    assert 0.9 * straight < tip < straight
+
+
+def test_path_of_a_thin_strip_ends_at_the_full_load() -> None:
+    model = thin_strip()
+    path = fem.follow_path(model, model.load)
+    state = fem.solve_static(model, model.load, fem.StaticSettings(steps=1))
+    assert path.load_factors[-1] == 1.0
+    assert np.abs(path.displacements[-1] - state.u).max() < 1e-4 * np.abs(state.u).max()
+
+
+def test_bound_holds_what_rounding_the_displacement_once_changes() -> None:
+    model = thin_strip()
+    state = fem.solve_static(model, model.load, fem.StaticSettings(steps=1))
+    slip = model.contact.no_slip(1)
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], model.n_dof)
+    moved = state.u * (1.0 + np.finfo(float).eps * signs)
+    change = internal_force(model, moved, slip)[0] - internal_force(model, state.u, slip)[0]
+    share = np.linalg.norm(change[model.free]) / rounding_force(model, state.u, slip[:, :, 0])
+    assert 1e-3 < share < 1.0
+
+
+def test_residual_above_that_bound_is_refused() -> None:
+    model = thin_strip()
+    with pytest.raises(fem.FemConvergenceError, match="relative residual"):
+        fem.solve_static(model, model.load, fem.StaticSettings(steps=1, max_iterations=2, cuts=0))
