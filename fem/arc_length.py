@@ -16,7 +16,7 @@ from fem.modes import rest_state
 from fem.newton import internal_force
 from fem.preload import StaticState
 from fem.rigid_motion import check_restraint
-from fem.roundoff import STALLED, rounding_force
+from fem.roundoff import is_rounding
 
 _GROW, _SHRINK = 1.5, 0.5
 _EASY, _HARD = 4, 7
@@ -240,10 +240,7 @@ class _Path:
 
     def _is_balanced(self, size: float, last: float, u: FloatArray, slip: FloatArray) -> bool:
         """Whether a residual of ``size`` N, after ``last``, is within the tolerance or all that rounding leaves."""
-        if size <= self._settings.tolerance * self._size:
-            return True
-        stalled = STALLED * last < size < last / STALLED
-        return stalled and size <= rounding_force(self._model, u, slip[:, :, 0])
+        return size <= self._settings.tolerance * self._size or is_rounding(self._model, u, slip, size, last)
 
     def _solve(self, u: FloatArray, slip: FloatArray, right: list[FloatArray]) -> list[FloatArray]:
         """Tangent answers to several loads."""

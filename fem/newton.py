@@ -22,7 +22,7 @@ from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.rigid_motion import loose_bodies, loose_motion
-from fem.roundoff import STALLED, rounding_force
+from fem.roundoff import is_rounding
 from fem.tangent_solver import TangentSolver
 
 _ROUNDOFF = 1e-14
@@ -125,7 +125,9 @@ class LoadStep:
             driving = driven and iteration == 0
             norm = point.size / limit.scale
             limit.history.append(norm)
-            if not driving and (norm <= limit.residual or self._is_rounding(point, last)):
+            if not driving and (
+                norm <= limit.residual or is_rounding(self.model, point.u, self._slip, point.size, last)
+            ):
                 return point
             last = point.size
             if not np.isfinite(norm):
@@ -136,12 +138,6 @@ class LoadStep:
             point = self._iterate(point, tried, driving=driving, closing=closing)
             self._last = point.contact
         return None
-
-    def _is_rounding(self, point: Point, last: float) -> bool:
-        """Whether the residual has stalled, after ``last`` N, at what rounding leaves of it."""
-        if not STALLED * last < point.size < last / STALLED:
-            return False
-        return point.size <= rounding_force(self.model, point.u, self._slip[:, :, 0])
 
     def _at(self, u: FloatArray, shortening: FloatArray) -> Point:
         model, target = self.model, self.target

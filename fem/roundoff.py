@@ -26,3 +26,13 @@ def rounding_force(model: Model, u: FloatArray, slip: FloatArray) -> float:
     """
     K = model.elastic_tangent(u) + model.contact.tangent(u, slip)
     return float(np.finfo(float).eps * np.linalg.norm((abs(K) @ np.abs(u))[model.free]))
+
+
+def is_rounding(model: Model, u: FloatArray, slip: FloatArray, size: float, last: float) -> bool:
+    """Whether a residual of ``size`` N at u, after ``last`` one iteration before, has stalled at what rounding leaves.
+
+    Parameters
+    ----------
+    slip : (n_point, 2, 1) m, history at the beginning of the step.
+    """
+    return STALLED * last < size < last / STALLED and size <= rounding_force(model, u, slip[:, :, 0])

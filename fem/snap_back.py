@@ -10,6 +10,7 @@ from fem.errors import FemConvergenceError
 from fem.model import Model
 from fem.modes import ModalBasis
 from fem.preload import Progress, StaticState
+from fem.roundoff import is_rounding
 from fem.tangent_solver import TangentSolver
 
 
@@ -34,7 +35,7 @@ def hold_modes(
     Parameters
     ----------
     eta : (n_held,) m kg^0.5, coordinates of the first modes.
-    tolerance : residual relative to the linear modal force omega^2 M phi eta.
+    tolerance : residual relative to the linear modal force omega^2 M phi eta, or what rounding leaves of it.
     max_iterations : of Newton, per step.
     """
     hold = _Hold(model, equilibrium, modes, (eta, steps), (tolerance, max_iterations, solver))
@@ -72,11 +73,14 @@ class _Hold:
         """From the state before to ``step`` of all steps, by Newton with the consistent tangent."""
         self.u = self.u + self.shapes @ (self.eta / self.steps)
         self.c = self.c + self.stiffness * self.eta / self.steps
+        last = float("inf")
         for _ in range(self.max_iterations):
             residual, miss = self._residual(step)
-            if self.history[-1] <= self.tolerance:
+            size = self.history[-1] * self.scale
+            if self.history[-1] <= self.tolerance or is_rounding(self.model, self.u, self.slip, size, last):
                 self.slip = self.state.slip
                 return
+            last = size
             moved, loaded = self.newton.solve(self._tangent(symmetric=False), self._symmetric, residual, miss)
             self.u, self.c = self.u + moved, self.c + loaded
         raise FemConvergenceError(
