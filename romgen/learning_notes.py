@@ -135,7 +135,7 @@ def _rests(errors: Sequence[TrajectoryError]) -> Iterator[str]:
             yield (
                 f"trajectory '{error.name}' comes to rest {error.rest_percent:.2g} % of its largest motion off the "
                 "equilibrium (residual slip, or an offset of the sensors); the model decays to zero and misses late "
-                "samples by this much"
+                'samples by this much; [data] zero = "rest" counts recorded motions from where they come to rest'
             )
 
 

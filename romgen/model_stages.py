@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
 from romgen.errors import InputError
+from romgen.rest_position import counted_from, offset_percent, rest_position
 from romgen.settings import DataSettings, RingDownSettings, Study
 from romgen.stage import Context, Stage
 from romgen.structure import Modes, Preload, RingDown, Structure
@@ -168,10 +169,22 @@ def share_out(data: DataSettings) -> Recorded:
 
     Raises
     ------
-    InputError : a file cannot be read, a unit or a trajectory is unknown.
+    InputError : a file cannot be read, a unit or a trajectory is unknown, or a motion does not come to rest.
     """
     trajectories = read_trajectories(data.files, data.sensors, data.unit)
-    return Recorded(_chosen(trajectories, data.training, data), _chosen(trajectories, data.validation, data))
+    groups = (_chosen(trajectories, wanted, data) for wanted in (data.training, data.validation))
+    training, validation = (
+        tuple(_zeroed(item) for item in group) if data.zero == "rest" else group for group in groups
+    )
+    return Recorded(training, validation)
+
+
+def _zeroed(trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory counted from where it comes to rest; say how far that is from its recorded zero."""
+    rest = rest_position(trajectory)
+    offset = offset_percent(trajectory, rest)
+    log.info("trajectory '%s' rests %.2g %% of its largest motion off its recorded zero", trajectory.name, offset)
+    return counted_from(trajectory, rest)
 
 
 def _chosen(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -17,6 +18,7 @@ class DataSettings(Settings):
     unit: str = "m"
     training: tuple[int | str, ...] = Field(min_length=1)
     validation: tuple[int | str, ...] = ()
+    zero: Literal["recorded", "rest"] = "recorded"
 
     @field_validator("files")
     @classmethod
