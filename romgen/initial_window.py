@@ -6,11 +6,11 @@ import numpy as np
 
 from romgen.arrays import BoolArray, ComplexArray, FloatArray
 from romgen.chart import ReducedTrajectory
+from romgen.chart_inverse import chart_inverse, linear_start
 from romgen.errors import NumericalError
 from romgen.etdrk4 import largest_step
 from romgen.field_table import real_map
 from romgen.reduced_model import ReducedModel
-from romgen.simulate import chart_inverse
 from romgen.variational import real_slopes, sensitivities
 
 # The window is this many periods of the slowest mode: beats of two modes need more than one.
@@ -39,19 +39,6 @@ def fitted_start(model: ReducedModel, r: ReducedTrajectory) -> ComplexArray:
 def _candidates(model: ReducedModel, w0: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     y0 = w0 * model.scale
     return chart_inverse(model, y0)[0], linear_start(model, y0)
-
-
-def linear_start(model: ReducedModel, y0: FloatArray) -> ComplexArray:
-    """Return z (m,) of y0 (2m,) by the inverse of the linear part of the chart, which never leaves its range."""
-    m = len(model.eigenvalues)
-    V = np.zeros((2 * m, 2 * m), dtype=np.complex128)
-    linear = np.flatnonzero(model.chart.exponents.sum(axis=1) == 1)
-    for k in linear:
-        V[:, int(np.argmax(model.chart.exponents[k]))] = model.chart.coefficients[:, k]
-    real = np.hstack([(V[:, :m] + V[:, m:]).real, -(V[:, :m] - V[:, m:]).imag])
-    parts = np.linalg.solve(real, y0 / model.scale)
-    z0: ComplexArray = parts[:m] + 1j * parts[m:]
-    return z0
 
 
 def _gauss_newton(model: ReducedModel, r: ReducedTrajectory, z0: ComplexArray) -> tuple[ComplexArray, float]:

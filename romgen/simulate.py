@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import Literal
 
 import numpy as np
@@ -11,14 +10,10 @@ from scipy.integrate import solve_ivp
 from romgen.arrays import ComplexArray, FloatArray
 from romgen.errors import InputError, NumericalError
 from romgen.etdrk4 import largest_step, march
-from romgen.polynomial import evaluate, jacobian, zeta
+from romgen.polynomial import evaluate, zeta
 from romgen.reduced_model import ReducedModel
 
-log = logging.getLogger(__name__)
 Hold = Literal["constant", "linear"]
-# The polished chart inverse stops at rounding; Newton from H converges quadratically or not at all.
-NEWTON_TOLERANCE = 1e-13
-NEWTON_STEPS = 20
 BLOW_UP = 1e3
 
 
@@ -140,50 +135,3 @@ def sensors(model: ReducedModel, z: ComplexArray) -> tuple[FloatArray, FloatArra
     """Return sensor displacement (m) and velocity (m/s), each (n_time, n_sensor), of z (n_time, m)."""
     w = evaluate(model.chart, zeta(z)).real
     return evaluate(model.displacement, w), evaluate(model.velocity, w)
-
-
-def initial_state(model: ReducedModel, y0: FloatArray) -> ComplexArray:
-    """Return z with Re(T zeta^E) = y0 / s: start z = H (y0/s)^E, Newton where it converges, else that start.
-
-    A start that Newton could not polish is logged as a warning with what it misses of y0.
-
-    Parameters
-    ----------
-    y0 : (2m,) modal displacements and velocities.
-
-    Returns
-    -------
-    (m,) z.
-    """
-    z, misfit = chart_inverse(model, y0)
-    if misfit > NEWTON_TOLERANCE:
-        log.warning(
-            "%s: start state misses y by %.2g of its size; it lies outside the charted range", model.name, misfit
-        )
-    return z
-
-
-def chart_inverse(model: ReducedModel, y0: FloatArray) -> tuple[ComplexArray, float]:
-    """Return z (m,) for y0 (2m,) and what it misses, max abs(Re(T zeta^E) - y0/s) / max(1, abs(y0/s))."""
-    w0 = y0 / model.scale
-    start: ComplexArray = evaluate(model.inverse_chart, w0[None])[0]
-    z = start
-    m = len(start)
-    first = np.inf
-    for _ in range(NEWTON_STEPS):
-        miss = evaluate(model.chart, zeta(z[None]))[0].real - w0
-        size = float(np.abs(miss).max()) / max(1.0, float(np.abs(w0).max()))
-        first = min(first, size) if z is start else first
-        if size <= NEWTON_TOLERANCE:
-            return z, size
-        J = jacobian(model.chart, zeta(z[None]))[0]
-        tangent = np.hstack([(J[:, :m] + J[:, m:]).real, -(J[:, :m] - J[:, m:]).imag])
-        try:
-            change = np.linalg.solve(tangent, miss)
-        except np.linalg.LinAlgError:
-            break
-        z = z - (change[:m] + 1j * change[m:])
-        # T is trusted on the data cloud only; a root far from H(y0/s) belongs to another branch.
-        if not np.abs(z - start).max() <= 0.5 * max(float(np.abs(start).max()), 1e-12):
-            break
-    return start, first

@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from romgen.arrays import ComplexArray, FloatArray, IntArray
 from romgen.chart import ReducedTrajectory
+from romgen.chart_inverse import chart_inverse, linear_start
 from romgen.errors import NumericalError
-from romgen.initial_window import fitted_start, linear_start
+from romgen.initial_window import fitted_start
 from romgen.manifold import Manifold, nmte_blocks
 from romgen.metrics import nmte_percent
 from romgen.polynomial import evaluate
 from romgen.reduced_model import ReducedModel
-from romgen.simulate import chart_inverse, coordinates, free_motion, sensors
+from romgen.simulate import coordinates, free_motion, sensors
 from romgen.trajectory import Trajectory
 
 REST_PERIODS = 10.0

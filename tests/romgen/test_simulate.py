@@ -9,7 +9,7 @@ from romgen.errors import InputError, NumericalError
 from romgen.etdrk4 import largest_step, phi_functions
 from romgen.polynomial import PolynomialMap, evaluate, exponents, zeta
 from romgen.reduced_model import ReducedModel
-from romgen.simulate import initial_state, sensors, simulate, simulate_reference
+from romgen.simulate import sensors, simulate, simulate_reference
 
 EIGENVALUES = np.array([-3.0 + 690.0j, -6.0 + 1240.0j])
 
@@ -92,12 +92,6 @@ def test_constant_hold_ignores_the_last_sample(model: ReducedModel) -> None:
     exact = (np.exp(EIGENVALUES * 1e-3) - 1) / EIGENVALUES * model.input_matrix[:, 0]
     # the state stays at 4e-4, where quadratic terms change it by 27 * 4e-4 * 1e-3 relative
     assert held[-1] == pytest.approx(exact, rel=1e-4)
-
-
-def test_initial_state_inverts_the_chart(model: ReducedModel) -> None:
-    z0 = np.array([0.3 - 0.2j, 0.1 + 0.25j])
-    y0 = evaluate(model.chart, zeta(z0[None]))[0].real * model.scale
-    assert initial_state(model, y0) == pytest.approx(z0, abs=1e-11)
 
 
 def test_sensors_are_the_composed_maps(model: ReducedModel) -> None:
