@@ -36,11 +36,13 @@ ADVICE = "use a smaller time step, a smaller amplitude, or a start that has sett
 class Corrector:
     """Solves steps to a residual of ``tolerance`` times ``scale`` N in at most ``max_iterations``.
 
-    Without a scale it is the largest inertia force or load of the case so far, this step included.
+    Without a scale it is the largest inertia force or load of the case so far, this step included. While a loaded
+    structure rests there is neither: a residual of ``rounding`` N is balance then.
     """
 
-    def __init__(self, tolerance: float, scale: float | None, max_iterations: int) -> None:
+    def __init__(self, tolerance: float, scale: float | None, max_iterations: int, rounding: float = 0.0) -> None:
         self.tolerance, self.scale, self.max_iterations = tolerance, scale, max_iterations
+        self._least = rounding / tolerance
 
     def size(self, trial: Trial, problem: StepProblem) -> FloatArray:
         """Norms of the residuals relative to the scale, (n_case,)."""
@@ -48,6 +50,7 @@ class Corrector:
         if self.scale is not None:
             return np.asarray(residual / self.scale)
         scale = np.maximum(problem.force, np.sqrt(np.einsum("nc,nc->c", trial.inertia_a, trial.inertia_a)))
+        scale = np.maximum(scale, self._least)
         # A case at rest on which nothing acts has neither residual nor scale.
         return np.asarray(residual / np.where(scale > 0.0, scale, 1.0))
 

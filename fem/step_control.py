@@ -11,6 +11,7 @@ from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError
 from fem.generalized_alpha import Scheme
 from fem.interface_equilibrium import loosened
+from fem.modes import ModalBasis
 from fem.motion import MotionState, Pace, StepRecord
 from fem.step_equation import StepEquation
 
@@ -27,6 +28,10 @@ WORTH = 0.8
 """Share of the iterations for which a factor was made that a step with it may take for the factor to stay."""
 
 
+RIGID = 1e-3
+"""Share of the highest frequency of the basis below which a mode is one of a free body and has no deflection."""
+
+
 @dataclass(frozen=True)
 class StepControl:
     """What sizes are allowed and what local error.
@@ -34,7 +39,8 @@ class StepControl:
     Attributes
     ----------
     finest : most halvings of the output interval; coarsest : fewest, negative for steps of several intervals.
-    error_tolerance : local error of a step in the mass norm of u over the largest displacement so far; None: fixed.
+    error_tolerance : local error of a step in the mass norm of u over the largest displacement so far, or over what
+        the present load would deflect where that is more, as it is from rest; None: fixed.
     max_iterations : of a step. refactor_above : iterations above which a case gets a factor of its own; 0: never.
     apart : points that slip or open are taken for the equilibrium of their own.
     """
@@ -46,8 +52,10 @@ class StepControl:
     refactor_above: int
     apart: bool
 
-    def error(self, equation: StepEquation, old: MotionState, record: StepRecord) -> float:
+    def error(self, equation: StepEquation, old: MotionState, record: StepRecord, deflection: FloatArray) -> float:
         """Largest local error over its tolerance of all cases; 0 where steps are fixed.
+
+        ``deflection`` (n_case,) by the present load, and of what is noise, in the mass norm.
 
         e = (b + (am - af)/2 - 1/6) h^2 (a_(n+1) - a_n): what a Taylor series adds to the u of the scheme, whose a
         belongs to the time t + (am - af) h. Zienkiewicz & Xie, Earthquake Eng. Struct. Dyn. 20 (1991) 871-887, eq. (12)
@@ -58,7 +66,7 @@ class StepControl:
         s, new = equation.scheme, record.state
         factor = (s.beta + 0.5 * (s.alpha_m - s.alpha_f) - 1.0 / 6.0) * equation.step**2
         squared = np.einsum("nc,nc->c", new.a - old.a, new.inertia_a - old.inertia_a)
-        scale = np.maximum(new.pace.peak, equation.dynamics.size(new.u))
+        scale = np.maximum(np.maximum(new.pace.peak, equation.dynamics.size(new.u)), deflection)
         error = abs(factor) * np.sqrt(np.maximum(squared, 0.0))
         # A case that rests with nothing acting on it has neither error nor scale.
         return float((error / np.where(scale > 0.0, scale, 1.0)).max() / self.error_tolerance)
@@ -114,6 +122,17 @@ class StepControl:
             return pace, 0
         pace = replace(pace, before=np.where(slow, iterations, pace.before))
         return _anchored(pace, slow, u, slip), int(slow.sum())
+
+
+def modal_deflection(modes: ModalBasis, load: FloatArray, rounding: float) -> FloatArray:
+    """Mass norm of phi_j' p / omega_j^2 over the elastic modes, (n_case,) m kg^0.5; at least that of ``rounding`` N.
+
+    Without it a motion from rest has nothing to compare its local error with.
+    """
+    elastic = modes.omega > RIGID * modes.omega.max()
+    compliance = modes.shapes[:, elastic] / modes.omega[elastic] ** 2
+    noise = rounding * float(np.linalg.norm(compliance, axis=0).max(initial=0.0))
+    return np.asarray(np.maximum(np.linalg.norm(compliance.T @ load, axis=0), noise))
 
 
 def _dropped(pace: Pace, gone: BoolArray) -> Pace:

@@ -26,7 +26,8 @@ from fem.modes import ModalBasis, Rayleigh
 from fem.motion import Effort, MotionState, SolvedStep, StepRecord, extrapolated
 from fem.preconditioner import Preconditioner
 from fem.preload import StaticState
-from fem.step_control import StepControl, rescaled, too_small
+from fem.roundoff import rounding_force
+from fem.step_control import StepControl, modal_deflection, rescaled, too_small
 from fem.step_equation import StepEquation, StepProblem
 
 METHODS = ("anderson", "newton")
@@ -120,7 +121,9 @@ class Transient:
         self.rest_energies = self.dynamics.rest_energies
         self._correction = self._modal_inertia(modes)
         self._equations: dict[int, StepEquation] = {}
-        self._corrector = Corrector(settings.tolerance, force_scale, settings.max_iterations)
+        self._modes = modes
+        self._rounding = rounding_force(model, equilibrium.u, equilibrium.contact.slip[:, :, 0])
+        self._corrector = Corrector(settings.tolerance, force_scale, settings.max_iterations, self._rounding)
         self._control = StepControl(
             settings.max_cutbacks,
             0 if settings.error_tolerance is None else -settings.max_doublings,
@@ -231,7 +234,7 @@ class Transient:
                 wasted = wasted + max(len(error.history) - 1, 0)
                 rejected += 1
                 continue
-            error_ratio = self._control.error(equation, old, record)
+            error_ratio = self._control.error(equation, old, record, self._deflection(old, level))
             if error_ratio <= 1.0:
                 spent = Effort(wasted, rejected=rejected)
                 paced = self._control.paced(self.dynamics, old, record, level, error_ratio)
@@ -239,6 +242,14 @@ class Transient:
             wasted = wasted + record.iterations
             rejected += 1
         raise too_small(state, error_ratio, equation.step)
+
+    def _deflection(self, old: MotionState, level: int) -> FloatArray:
+        """What local errors are at least compared with: deflection by the load there, by rounding over its share."""
+        if self.settings.error_tolerance is None:
+            return np.zeros(old.u.shape[1])
+        end = (old.pace.position + 2.0**-level) * self.settings.time_step
+        load = self.dynamics.load(end, old.u.shape[1]) - self.model.load[:, None]
+        return modal_deflection(self._modes, load, self._rounding / self.settings.error_tolerance)
 
     def _advance(self, equation: StepEquation, old: MotionState, level: int, anderson: Anderson) -> StepRecord:
         n_case, h, position = old.u.shape[1], self.settings.time_step, old.pace.position

@@ -47,7 +47,15 @@ def is_uniform(t: FloatArray, step: float | None = None) -> bool:
 
 
 def resample(t: FloatArray, x: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-    """Return uniform times from t[0] in steps of ``step`` and x there, by an interpolating spline of degree 7."""
+    """Return uniform times from t[0] in steps of ``step`` and x there, by an interpolating spline of degree 7.
+
+    Raises
+    ------
+    InputError : fewer samples than such a spline needs.
+    """
+    if len(t) <= SPLINE_DEGREE:
+        advice = f"give at least {SPLINE_DEGREE + 1} samples"
+        raise InputError("too short for resampling", where="differences", value=len(t), advice=advice)
     n = int(np.floor((t[-1] - t[0]) / step * (1 + 1e-12))) + 1
     uniform = t[0] + step * np.arange(n)
     values: FloatArray = make_interp_spline(t, x, k=SPLINE_DEGREE, axis=0)(np.minimum(uniform, t[-1]))

@@ -65,7 +65,7 @@ def write_trajectories(path: Path, trajectories: Iterable[Trajectory]) -> None:
     if path.suffix.lower() == ".npz":
         arrays: dict[str, Any] = {}
         for item in trajectories:
-            arrays[f"{item.name}/t"], arrays[f"{item.name}/x"] = item.t, item.displacement
+            arrays |= {f"{item.name}/t": item.t, f"{item.name}/x": item.displacement, f"{item.name}/unit": "m"}
         np.savez(path, **arrays)
         return
     if path.suffix.lower() not in (".h5", ".hdf5"):
@@ -78,9 +78,9 @@ def write_trajectories(path: Path, trajectories: Iterable[Trajectory]) -> None:
             group.attrs["sensors"] = list(item.sensors)
 
 
-def _factor(unit: str, where: str) -> float:
+def _factor(unit: str, where: str, si: str = "m") -> float:
     try:
-        return unit_factor(unit, "m")
+        return unit_factor(unit, si)
     except ValueError as error:
         raise InputError(str(error), where=where) from error
 
@@ -141,8 +141,9 @@ def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
 
 def _group_pair(name: str, group: h5py.Group, sensors: Sequence[str], unit: str) -> Pair:
     """Return t and x of a group; where it names its sensors and the study names one of them, they are found by name."""
-    t = np.asarray(group["t"], dtype=np.float64).ravel()
     where = f"{Path(group.file.filename).name}, trajectory '{name}'"
+    clock = _factor(str(group["t"].attrs.get("unit", "s")), where, "s")
+    t = clock * np.asarray(group["t"], dtype=np.float64).ravel()
     x = _factor(str(group["x"].attrs.get("unit", unit)), where) * _time_first(group["x"][()], t.size)
     own = [str(sensor) for sensor in group.attrs.get("sensors", ())]
     if not set(own) & set(sensors):
@@ -162,8 +163,7 @@ def _read_npz(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
             if f"{prefix}x" not in arrays:
                 raise InputError("array t without array x", where=path.name, value=f"{prefix}t")
             t = np.asarray(arrays[f"{prefix}t"], dtype=np.float64).ravel()
-            # Files of this package are in m; a bare pair t, x has the unit of the study.
-            factor = 1.0 if name else _factor(unit, path.name)
+            factor = _factor(str(arrays[f"{prefix}unit"]) if f"{prefix}unit" in arrays else unit, path.name)
             pairs.append((name or path.stem, t, factor * _time_first(arrays[f"{prefix}x"], t.size)))
     return pairs
 

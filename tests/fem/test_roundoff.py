@@ -86,3 +86,43 @@ def test_thin_strip_is_held_in_the_shape_of_its_first_mode() -> None:
     c = modes.shapes[:, 0] @ force
     left = np.linalg.norm((force - modes.left[:, 0] * c)[model.free])
     assert left <= rounding_force(model, state.u, slip[:, :, 0])
+
+
+def loaded_beam() -> tuple[fem.Model, fem.StaticState, fem.ModalBasis]:
+    """A cantilever of 1 m under its own weight, at rest."""
+    steel = fem.Material(young_modulus=210e9, poisson_ratio=0.3, density=7800.0)
+    lines = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.05]), np.array([0.0, 0.05])
+    model = fem.build_model(
+        [fem.Body("beam", fem.hex_block(*lines), steel)],
+        supports=[fem.Support("beam.x_min", ("x", "y", "z"))],
+        loads=[fem.Gravity("weight", (0.0, 0.0, -9.81))],
+    )
+    state = fem.solve_static(model, model.load, fem.StaticSettings(steps=1))
+    return model, state, fem.solve_modes(model, state, 2)
+
+
+def pulse(t: float) -> float:
+    """Nothing for 2 ms, then half a sine of 4 ms."""
+    return float(np.sin(np.pi * (t - 2e-3) / 4e-3)) if 2e-3 < t < 6e-3 else 0.0
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        fem.TransientSettings(1e-4),
+        fem.TransientSettings(1e-4, method="newton"),
+        fem.TransientSettings(1e-4, error_tolerance=1e-3),
+    ],
+)
+def test_loaded_structure_rests_until_it_is_struck(settings: fem.TransientSettings) -> None:
+    """Neither inertia nor a change of the load measures the residual before; the local error has no motion either."""
+    model, state, modes = loaded_beam()
+    blow = fem.time_load(model, fem.Force("blow", "beam.x_max", (0.0, 0.0, -100.0)), pulse)
+    march = fem.Transient(model, state, modes, fem.Rayleigh(5.0, 0.0), settings, loads=[blow])
+    still = np.zeros((model.n_dof, 1))
+    rows = fem.sensor_rows(model, [fem.Sensor("tip", (1.0, 0.05, 0.05), "z")])
+    seen = fem.record_history(march, march.start(still, still), 100, rows).displacement[:, 0, 0]
+    assert np.abs(seen[:20]).max() < 1e-6 * np.abs(seen).max()
+    # impulse over modal mass: P 2 tau / pi phi^2 / omega, the blow lasting a fifth of a period: 0.95 of it at most
+    impulsive = 100.0 * 2.0 * 4e-3 / np.pi * float(np.sum((rows @ modes.shapes) ** 2)) / modes.omega[0]
+    assert 0.8 * impulsive < np.abs(seen).max() < 1.1 * impulsive

@@ -188,7 +188,9 @@ def test_error_estimate_is_the_local_error(beam: Linear, rho: float) -> None:
             u, v = float(left @ old.u[:, 0]), float(left @ old.v[:, 0])
             exact = u * np.cos(omega * h) + v / omega * np.sin(omega * h)
             errors.append(abs(eta(beam, record)[0] - exact))
-            estimates.append(control.error(transient._equation(0), old, record) * record.state.pace.peak[0])
+            estimates.append(
+                control.error(transient._equation(0), old, record, np.zeros(1)) * record.state.pace.peak[0]
+            )
         old = record.state
     np.testing.assert_allclose(estimates, errors, atol=5.0 * omega * h * max(errors))
 

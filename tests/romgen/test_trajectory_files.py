@@ -204,3 +204,20 @@ def test_csv_line_numbers_count_empty_lines(tmp_path: Path) -> None:
 def test_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="unknown trajectory format"):
         read_trajectories([tmp_path / "a.xls"], SENSORS, "m")
+
+
+def test_named_pairs_without_a_unit_have_that_of_the_study(tmp_path: Path) -> None:
+    t = np.linspace(0.0, 1.0, 11)
+    x = t[:, None]
+    np.savez(tmp_path / "pairs.npz", **{"a/t": t, "a/x": x, "b/t": t, "b/x": x, "b/unit": "um"})
+    a, b = read_trajectories([tmp_path / "pairs.npz"], ("tip",), "mm")
+    assert a.displacement[-1] == pytest.approx(1e-3)
+    assert b.displacement[-1] == pytest.approx(1e-6)
+
+
+def test_hdf5_time_has_the_unit_that_it_names(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "slow.h5", "w") as file:
+        group = file.create_group("a")
+        group.create_dataset("t", data=np.linspace(0.0, 1000.0, 11)).attrs["unit"] = "ms"
+        group.create_dataset("x", data=np.linspace(0.0, 1.0, 11)[:, None])
+    assert read_trajectories([tmp_path / "slow.h5"], ("tip",), "m")[0].t[-1] == pytest.approx(1.0)
