@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bounds import require
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError
 from fem.linear_solver import make_solver
@@ -37,6 +38,12 @@ class PathSettings:
     max_iterations: int = 12
     max_steps: int = 200
     solver: str = "auto"
+
+    def __post_init__(self) -> None:
+        require("path settings", "max_iterations", self.max_iterations, 1)
+        require("path settings", "max_steps", self.max_steps, 1)
+        for name in ("step", "largest_step", "smallest_step", "tolerance"):
+            require("path settings", name, getattr(self, name), 0.0, above=True)
 
 
 @dataclass(frozen=True)

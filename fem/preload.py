@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bounds import require
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.model import Model
@@ -56,6 +57,12 @@ class StaticSettings:
     max_iterations: int = 30
     solver: str = "auto"
     cuts: int = 6
+
+    def __post_init__(self) -> None:
+        require("static settings", "steps", self.steps, 1)
+        require("static settings", "max_iterations", self.max_iterations, 1)
+        require("static settings", "cuts", self.cuts, 0)
+        require("static settings", "tolerance", self.tolerance, 0.0, above=True)
 
 
 def solve_static(

@@ -14,6 +14,7 @@ import numpy as np
 
 from fem.anderson import Anderson
 from fem.arrays import FloatArray
+from fem.bounds import require
 from fem.corrector import Corrector
 from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError, FemInputError
@@ -55,8 +56,8 @@ class TransientSettings:
     interface_equilibrium : find the equilibrium of the contact points that slip or open apart in every iteration,
         see ``interface_equilibrium``; fewer iterations to the same residual.
     max_cutbacks : most halvings of ``time_step``, for convergence or for the local error.
-    error_tolerance : local error of a step in the mass norm of the displacement, relative to the largest so far; None:
-        fixed steps.
+    error_tolerance : local error of a step in the mass norm of the displacement, relative to the largest so far or to
+        what the load deflects; None: fixed steps.
     max_doublings : most doublings of ``time_step`` where the local error allows; outputs inside a step are
         interpolated.
     """
@@ -79,6 +80,9 @@ class TransientSettings:
     def __post_init__(self) -> None:
         if not self.time_step > 0.0:
             raise FemInputError("time step must be positive", where="transient", value=self.time_step)
+        for name, least in (("depth", 1), ("max_iterations", 1), ("max_cutbacks", 0), ("max_doublings", 0)):
+            require("transient", name, getattr(self, name), least)
+        require("transient", "tolerance", self.tolerance, 0.0, above=True)
         if self.method not in METHODS:
             advice = f"choose one of {', '.join(METHODS)}"
             raise FemInputError("unknown method", where="transient", value=self.method, advice=advice)

@@ -160,3 +160,14 @@ def test_bolts_that_cannot_be_built_say_why(bolt: Bolt, message: str) -> None:
 def test_bolts_out_of_range_are_refused(force: float, axis: str) -> None:
     with pytest.raises(FemInputError, match="bolt b"):
         Bolt("b", "shank", force, axis)
+
+
+def test_bolt_that_nothing_presses_back_is_refused() -> None:
+    """A bar held at one end: shortening it builds up no force."""
+    lines = np.linspace(0.0, 1.0, 5), np.array([0.0, 0.2]), np.array([0.0, 0.2])
+    bar = Body("bar", hex_block(*lines), SOFT)
+    model = build_model(
+        [bar], bolts=[Bolt("x", "bar", 1e3, axis="x")], supports=[Support("bar.x_min", ("x", "y", "z"))]
+    )
+    with pytest.raises(FemInputError, match="bolt x: nothing holds against tightening"):
+        solve_preload(model, StaticSettings())
