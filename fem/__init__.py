@@ -12,7 +12,7 @@ from fem.contact_report import PenaltyReport, penalty_reports
 from fem.equilibrium import InterfaceState, interface_states
 from fem.errors import FemConvergenceError, FemError, FemInputError
 from fem.excitation import SupportMotion, TimeLoad, base_load, support_motion, time_load
-from fem.history import History, record_history
+from fem.history import EnergyWarning, History, record_history
 from fem.inp_writer import nodal_loads, write_inp
 from fem.interfaces import Pair, Tie
 from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
@@ -45,6 +45,7 @@ __all__ = [
     "Body",
     "Bolt",
     "Clamp",
+    "EnergyWarning",
     "EquilibriumPath",
     "ExplicitSettings",
     "ExplicitTransient",

@@ -247,7 +247,8 @@ class _Path:
 
     def _is_balanced(self, size: float, last: float, u: FloatArray, slip: FloatArray) -> bool:
         """Whether a residual of ``size`` N, after ``last``, is within the tolerance or all that rounding leaves."""
-        return size <= self._settings.tolerance * self._size or is_rounding(self._model, u, slip, size, last)
+        sizes = size, last, self._size
+        return size <= self._settings.tolerance * self._size or is_rounding(self._model, u, slip, sizes)
 
     def _solve(self, u: FloatArray, slip: FloatArray, right: list[FloatArray]) -> list[FloatArray]:
         """Tangent answers to several loads."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,15 @@ import numpy as np
 from fem.arrays import FloatArray
 from fem.central_difference import ExplicitTransient
 from fem.motion import MotionState, StepRecord
+from fem.sliding import sliding_motion, warn_of_sliding
 from fem.transient import Transient
+
+OPEN = 0.1
+"""Share of the energy that went through a march which its ledger may miss without a warning."""
+
+
+class EnergyWarning(UserWarning):
+    """A march made or lost energy that nothing accounts for."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +69,20 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
     ----------
     sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
 
-    Raises as the march does; ``march_campaign`` hands on what a failed march computed.
+    Issues ``SlidingWarning`` and ``EnergyWarning``. Raises as the march does; ``march_campaign`` hands on what a failed
+    march computed.
     """
+    contact = transient.model.contact
     last = transient.observe(state)
-    rows = [_row(last, transient, sensors)]
+    rows, slid = [_row(last, transient, sensors)], np.zeros(contact.n_point)
     for record in transient.march(state, n_step):
         rows.append(_row(record, transient, sensors))
+        slid = np.maximum(slid, sliding_motion(contact, contact.relative(record.state.u), record.contact.status))
         last = record
     columns = [np.stack(column) for column in zip(*rows, strict=True)]
     motion, energies, done, force, areas = columns
     done = done - state.work
-    return History(
+    history = History(
         t=np.asarray((state.step + np.arange(len(rows))) * transient.settings.time_step),
         displacement=motion[:, 0],
         velocity=motion[:, 1],
@@ -86,6 +98,26 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
         slipping=areas[:, 1],
         state=last.resume,
     )
+    warn_of_sliding(contact, slid)
+    warn_of_imbalance(history)
+    return history
+
+
+def warn_of_imbalance(history: History) -> None:
+    """Issue ``EnergyWarning`` where the ledger is open by more than OPEN of the energy that went through the march."""
+    stored = history.kinetic + history.strain + history.contact
+    spent = history.friction + history.damping
+    through = np.abs(np.stack([history.kinetic, stored - stored.min(axis=0), spent, history.external])).max(axis=(0, 1))
+    miss = np.abs(history.imbalance)
+    for case in np.flatnonzero(miss.max(axis=0) > OPEN * through):
+        first = int(np.argmax(miss[:, case] > OPEN * through[case]))
+        warnings.warn(
+            f"case {case}: the energies of the march do not add up by {miss[:, case].max():.3g} J of "
+            f"{through[case]:.3g} J, from t = {history.t[first]:.4g} s on; use a smaller time step or spectral radius "
+            "(contact that opens and closes within a few steps makes energy)",
+            EnergyWarning,
+            stacklevel=3,
+        )
 
 
 def _row(record: StepRecord, transient: Marching, sensors: FloatArray) -> tuple[FloatArray, ...]:

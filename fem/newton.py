@@ -128,9 +128,8 @@ class LoadStep:
             driving = driven and iteration == 0
             norm = point.size / limit.scale
             limit.history.append(norm)
-            if not driving and (
-                norm <= limit.residual or is_rounding(self.model, point.u, self._slip, point.size, last)
-            ):
+            sizes = point.size, last, limit.scale
+            if not driving and (norm <= limit.residual or is_rounding(self.model, point.u, self._slip, sizes)):
                 return point
             last = point.size
             if not np.isfinite(norm):

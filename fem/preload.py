@@ -14,7 +14,7 @@ from fem.errors import FemConvergenceError, FemInputError
 from fem.model import Model
 from fem.newton import LoadStep, Target, Tolerance, internal_force
 from fem.rigid_motion import check_restraint, loose_bodies, loose_motion
-from fem.sliding import warn_of_sliding
+from fem.sliding import sliding_motion, warn_of_sliding
 
 Progress = Callable[[float], None]
 
@@ -164,7 +164,8 @@ class _Loading:
             if progress is not None:
                 progress(factor)
         contact = self._model.contact
-        warn_of_sliding(contact, contact.relative(self._u[:, None]), self._contact.status)
+        motion = sliding_motion(contact, contact.relative(self._u[:, None]), self._contact.status)
+        warn_of_sliding(contact, motion)
         return self._state(), self._shortening
 
     def _advance(self, old: float, new: float) -> None:

@@ -10,6 +10,9 @@ from fem.model import Model
 STALLED = 0.5
 """A residual that an iteration leaves above this share of the one before no longer falls as Newton's should."""
 
+LARGEST = 1e-3
+"""Share of the forces above which no residual is taken for rounding."""
+
 
 def rounding_force(model: Model, u: FloatArray, slip: FloatArray) -> float:
     """Norm of eps abs(K) abs(u) over the free degrees of freedom, N: the forces that rounding u once may change.
@@ -28,11 +31,16 @@ def rounding_force(model: Model, u: FloatArray, slip: FloatArray) -> float:
     return float(np.finfo(float).eps * np.linalg.norm((abs(K) @ np.abs(u))[model.free]))
 
 
-def is_rounding(model: Model, u: FloatArray, slip: FloatArray, size: float, last: float) -> bool:
-    """Whether a residual of ``size`` N at u, after ``last`` one iteration before, has stalled at what rounding leaves.
+def is_rounding(model: Model, u: FloatArray, slip: FloatArray, sizes: tuple[float, float, float]) -> bool:
+    """Whether the residual at u has stalled at what rounding leaves.
 
     Parameters
     ----------
     slip : (n_point, 2, 1) m, history at the beginning of the step.
+    sizes : of the residual, of that one iteration before, and of the forces that it is out of balance with, N. A
+        residual above LARGEST of these is no rounding however far u has run away.
     """
-    return STALLED * last < size < last / STALLED and size <= rounding_force(model, u, slip[:, :, 0])
+    size, last, scale = sizes
+    if not (STALLED * last < size < last / STALLED and size <= LARGEST * scale):
+        return False
+    return size <= rounding_force(model, u, slip[:, :, 0])

@@ -77,7 +77,8 @@ class _Hold:
         for _ in range(self.max_iterations):
             residual, miss = self._residual(step)
             size = self.history[-1] * self.scale
-            if self.history[-1] <= self.tolerance or is_rounding(self.model, self.u, self.slip, size, last):
+            sizes = size, last, self.scale
+            if self.history[-1] <= self.tolerance or is_rounding(self.model, self.u, self.slip, sizes):
                 self.slip = self.state.slip
                 return
             last = size

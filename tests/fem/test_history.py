@@ -8,17 +8,20 @@ import numpy as np
 import pytest
 
 from fem.arrays import FloatArray
+from fem.block import hex_block
 from fem.campaign import Observation, march_campaign
 from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.errors import FemInputError
 from fem.excitation import support_motion, time_load
-from fem.history import record_history
-from fem.loads import PointForce
+from fem.history import EnergyWarning, record_history, warn_of_imbalance
+from fem.loads import Gravity, PointForce
+from fem.material import Material
 from fem.modal_quantities import frequency_response
-from fem.model import Body, Model, Support, build_model
+from fem.model import Body, Model, Pair, Support, build_model
 from fem.modes import ModalBasis, Rayleigh, damping_ratios, no_modes, rayleigh, rest_state, solve_modes
 from fem.preload import StaticSettings, solve_static
 from fem.sensor import Sensor, sensor_rows
+from fem.sliding import SlidingWarning
 from fem.transient import Transient, TransientSettings
 from tests.fem.small_models import STEEL, box, clamped_strip
 
@@ -166,3 +169,34 @@ def test_frequency_response_is_that_of_the_mode() -> None:
     assert abs(answer[1, 0]) == pytest.approx(shares[0] / (2.0 * damping_ratios(modes, damping)[0]), rel=0.01)
     static = solve_static(model, load, StaticSettings(steps=1))
     assert answer[0, 0].real == pytest.approx(float((rows @ static.u)[0]), rel=0.05)
+
+
+def test_energy_that_nothing_accounts_for_is_said() -> None:
+    model, modes, rows = _cantilever()
+    march = ExplicitTransient(model, rest_state(model), Rayleigh(0.0, 0.0), ExplicitSettings(2e-5))
+    velocity = modes.shapes[:, :1]
+    seen = record_history(march, march.start(0.0 * velocity, velocity), 10, rows)
+    warn_of_imbalance(seen)
+    half = np.where(np.arange(11)[:, None] < 6, 1.0, 1.5)
+    with pytest.warns(EnergyWarning, match="case 0: the energies of the march do not add up") as caught:
+        warn_of_imbalance(replace(seen, kinetic=half * seen.kinetic))
+    assert f"from t = {seen.t[6]:.4g} s on" in str(caught[0].message)
+
+
+def test_sliding_during_a_march_is_said() -> None:
+    """A block at 2 m/s on a base whose facets are 0.1 m: after 10 ms it has slid by 20 mm, a tenth is 10 mm."""
+    soft = Material(1e8, 0.0, 2000.0)
+    base = hex_block(np.linspace(0.0, 0.3, 4), np.linspace(0.0, 0.1, 2), np.linspace(-0.05, 0.0, 2))
+    block = hex_block(np.linspace(0.0, 0.1, 2), np.linspace(0.0, 0.1, 2), np.linspace(0.0, 0.1, 2))
+    model = build_model(
+        [Body("base", base, soft, "linear"), Body("block", block, soft, "linear")],
+        pairs=[Pair("sole", "block.z_min", "base.z_max", 0.1)],
+        supports=[Support("base.z_min", ("x", "y", "z"))],
+        loads=[Gravity("weight", (0.0, 0.0, -9.81))],
+    )
+    rest = solve_static(model, model.load, StaticSettings(steps=1))
+    march = Transient(model, rest, no_modes(model, rest), Rayleigh(0.0, 0.0), TransientSettings(1e-3))
+    velocity = np.zeros((model.n_dof, 1))
+    velocity[3 * model.offsets[1] :: 3] = 2.0
+    with pytest.warns(SlidingWarning, match="contact sole: points slid by"):
+        record_history(march, march.start(0.0 * velocity, velocity), 12, np.zeros((1, model.n_dof)))

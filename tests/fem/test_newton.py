@@ -16,7 +16,7 @@ from fem.material import Material
 from fem.model import Body, Clamp, Model, Pair, Support, build_model
 from fem.newton import internal_force
 from fem.preload import StaticSettings, StaticState, solve_static
-from fem.sliding import SlidingWarning, sliding_notes
+from fem.sliding import SlidingWarning, sliding_motion, sliding_notes
 from tests.fem.small_models import STEEL, box, clamped_strip, wave
 
 ONE_STEP = StaticSettings(steps=1, solver="superlu")
@@ -159,7 +159,8 @@ def test_slip_beyond_the_small_sliding_range_warns() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", SlidingWarning)
         model, state = _slid(0.016)
-    assert sliding_notes(model.contact, model.contact.relative(state.u[:, None]), state.contact.status) == ()
+    motion = sliding_motion(model.contact, model.contact.relative(state.u[:, None]), state.contact.status)
+    assert sliding_notes(model.contact, motion) == ()
     with pytest.warns(SlidingWarning, match=r"contact joint: points slid by 0\.06.* more than the 0\.0333 m"):
         _slid(0.066)
 
