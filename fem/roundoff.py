@@ -27,8 +27,9 @@ def rounding_force(model: Model, u: FloatArray, slip: FloatArray) -> float:
 
     Source: Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., section 3.5, the bound of a product K u.
     """
-    K = model.elastic_tangent(u) + model.contact.tangent(u, slip)
-    return float(np.finfo(float).eps * np.linalg.norm((abs(K) @ np.abs(u))[model.free]))
+    K = (model.elastic_tangent(u) + model.contact.tangent(u, slip)).tocsr()
+    np.abs(K.data, out=K.data)
+    return float(np.finfo(float).eps * np.linalg.norm((K @ np.abs(u))[model.free]))
 
 
 def is_rounding(model: Model, u: FloatArray, slip: FloatArray, sizes: tuple[float, float, float]) -> bool:

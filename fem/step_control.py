@@ -129,7 +129,7 @@ def modal_deflection(modes: ModalBasis, load: FloatArray, rounding: float) -> Fl
 
     Without it a motion from rest has nothing to compare its local error with.
     """
-    elastic = modes.omega > RIGID * modes.omega.max()
+    elastic = modes.omega > RIGID * modes.omega.max(initial=0.0)
     compliance = modes.shapes[:, elastic] / modes.omega[elastic] ** 2
     noise = rounding * float(np.linalg.norm(compliance, axis=0).max(initial=0.0))
     return np.asarray(np.maximum(np.linalg.norm(compliance.T @ load, axis=0), noise))

@@ -11,11 +11,11 @@ from fem.campaign import Observation, march_campaign, modal_coordinates, modal_s
 from fem.errors import FemConvergenceError, FemInputError
 from fem.material import Material
 from fem.model import Body, Model, Support, build_model
-from fem.modes import ModalBasis, Rayleigh, solve_modes
+from fem.modes import ModalBasis, Rayleigh, no_modes, solve_modes
 from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, StaticState, solve_static
 from fem.snap_back import hold_modes
-from fem.step_control import StepControl
+from fem.step_control import StepControl, modal_deflection
 from fem.transient import Transient, TransientSettings
 from tests.fem.conftest import Strip
 from tests.fem.small_models import box
@@ -257,3 +257,11 @@ def test_error_tolerance_out_of_reach_is_named(beam: Linear) -> None:
 def test_settings_that_make_no_sense_are_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(FemInputError, match=message):
         replace(TransientSettings(1e-4), **options)
+
+
+def test_load_deflects_a_beam_by_its_modes(beam: Linear) -> None:
+    """A static state under M phi_1: eta = 1 / omega^2. Without modes there is none."""
+    model, rest, modes = beam
+    load = model.mass @ modes.shapes[:, :1]
+    assert modal_deflection(modes, load, 0.0) == pytest.approx(modes.omega[0] ** -2, rel=1e-9)
+    assert modal_deflection(no_modes(model, rest), load, 1.0) == 0.0
