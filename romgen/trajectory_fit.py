@@ -24,6 +24,8 @@ from romgen.shooting_start import Start, band_passed, charted, segments, start_m
 
 START_ORDER = 3
 MIN_PERIODS = 20.0
+# Coordinates above this share of the largest count for the periods of a motion.
+STRONG = 0.1
 # Segments per motion up to SHOT_ORDER: short enough that the rates of the start lose no period within one. Two blocks
 # of the cross-validation make one, so every segment has samples that count.
 SHOTS, SHOT_ORDER = 4, 5
@@ -39,13 +41,18 @@ STEPS_PER_PERIOD, LARGEST_TURN = 4.0, 0.5
 def is_long_enough(training: Sequence[ReducedTrajectory]) -> bool:
     """Whether every trajectory is uniform and has 20 periods of its slowest strong motion, as band-passing needs.
 
-    A period is two sign changes of the first modal coordinate.
+    A period is two sign changes of a modal coordinate about its mean over the last quarter: where sensors have offsets
+    or friction leaves a rest position, a decay does not cross zero to its end.
     """
     return all(is_uniform(r.t) and _periods(r) >= MIN_PERIODS for r in training)
 
 
 def _periods(r: ReducedTrajectory) -> float:
-    return 0.5 * float(np.count_nonzero(np.diff(np.signbit(r.y[:, 0]))))
+    eta = r.y[:, : r.y.shape[1] // 2]
+    eta = eta - eta[3 * len(eta) // 4 :].mean(axis=0)
+    largest = np.abs(eta).max(axis=0)
+    crossings = np.count_nonzero(np.diff(np.signbit(eta), axis=0), axis=0)
+    return 0.5 * float(crossings[largest >= STRONG * largest.max()].min())
 
 
 def fit_on_trajectories(

@@ -16,7 +16,7 @@ from romgen.linear_reference import LinearReference, linear_reference
 from romgen.normal_form import FitOrigin, fit_normal_form, resonance_table
 from romgen.order_selection import motion_error
 from romgen.shooting_start import band_passed, rates
-from romgen.trajectory_fit import fit_on_trajectories
+from romgen.trajectory_fit import fit_on_trajectories, is_long_enough
 from tests.romgen.fmu.models import random_model
 
 LAMBDA = np.array([-0.5 + 60.0j, -0.8 + 121.0j])
@@ -62,6 +62,14 @@ def test_starts_that_all_blow_up_are_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(refinement, "FAR", 0.1)
     with pytest.raises(NumericalError, match="blow up"):
         fit_on_trajectories(exchanging(), 3, (1, 2), 1e-8)
+
+
+def test_offsets_do_not_shorten_a_motion() -> None:
+    """Mode 2 alone at 60 and 121 rad/s for 1.6 s: 31 of its periods, and an offset that mode 1 never crosses."""
+    t = STEP * np.arange(801)
+    z = np.exp(np.outer(t, LAMBDA)) * [0.001, 0.3]
+    assert is_long_enough([motion(z, np.array([0.02, -0.01]))])
+    assert not is_long_enough([motion(z[:400], np.array([0.02, -0.01]))])
 
 
 def test_small_motions_give_the_linear_part_that_a_polynomial_over_all_amplitudes_bends() -> None:
