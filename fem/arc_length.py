@@ -15,7 +15,7 @@ from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.modes import rest_state
 from fem.newton import internal_force
-from fem.preload import StaticState
+from fem.preload import StaticState, nodal_load
 from fem.rigid_motion import check_restraint
 from fem.roundoff import is_rounding
 
@@ -105,9 +105,11 @@ def follow_path(
     Source: Riks, Int. J. Solids Struct. 15 (1979) 529-551.
     """
     check_restraint(model)
+    load = nodal_load(model, load)
     settings = settings or PathSettings()
     finished = stop if stop is not None else (lambda _, factor: factor >= 1.0)
     state = start if start is not None else rest_state(model)
+    state.check_belongs(model)
     path = _Path(model, load, settings)
     here = path.first(state)
     points, limits, length = [here], [], settings.step

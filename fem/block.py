@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
 from fem.element import reference_element
 from fem.errors import FemInputError
+from fem.finite_values import finite_array
 from fem.mesh import Mesh
 
 _SIDES = (
@@ -40,9 +42,9 @@ def graded(breakpoints: Sequence[float], cells: Sequence[int]) -> FloatArray:
 
 
 def hex_block(
-    x: FloatArray,
-    y: FloatArray,
-    z: FloatArray,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    z: npt.ArrayLike,
     *,
     element: str = "hex20",
     mapping: Callable[[FloatArray], FloatArray] | None = None,
@@ -61,8 +63,9 @@ def hex_block(
     """
     if element not in {"hex20", "hex27", "tet10"}:
         raise FemInputError("blocks consist of hex20, hex27 or tet10", where="block", value=element)
-    lines = [_with_midpoints(v) for v in (x, y, z)]
-    counts = [len(v) - 1 for v in (x, y, z)]
+    given = [_grid_lines(v, axis) for v, axis in zip((x, y, z), "xyz", strict=True)]
+    lines = [_with_midpoints(v) for v in given]
+    counts = [len(v) - 1 for v in given]
     grid = "hex27" if element == "tet10" else element
     offsets = np.rint(2 * reference_element(grid).nodes).astype(np.int64)
     cell = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 1, 3)
@@ -89,6 +92,15 @@ def arch(points: FloatArray, rise: float, span: float) -> FloatArray:
     x = points[:, 0]
     lift = np.where(np.abs(x) < 0.5 * span, 0.5 * rise * (1.0 + np.cos(2.0 * np.pi * x / span)), 0.0)
     return np.asarray(points + np.outer(lift, [0.0, 1.0, 0.0]))
+
+
+def _grid_lines(v: npt.ArrayLike, axis: str) -> FloatArray:
+    line = finite_array(v, (-1,), f"the grid lines along {axis}", where="block", advice="give increasing numbers")
+    if len(line) < 2 or np.any(np.diff(line) <= 0.0):
+        raise FemInputError(
+            "at least two increasing grid lines are needed", where=f"block, {axis}", value=line.tolist()
+        )
+    return line
 
 
 def _with_midpoints(v: FloatArray) -> FloatArray:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 from fem.errors import FemInputError
 
 
-def require(where: str, name: str, value: float, least: float, *, above: bool = False, most: float = math.inf) -> None:
+def require(where: str, name: str, value: object, least: float, *, above: bool = False, most: float = math.inf) -> None:
     """Refuse a setting that is not finite, below ``least`` (or at it, where it must be ``above``) or over ``most``."""
-    if math.isfinite(value) and (value > least if above else value >= least) and value <= most:
+    number = float(value) if isinstance(value, Real) else math.nan
+    if math.isfinite(number) and (number > least if above else number >= least) and number <= most:
         return
     bound = f"{'above' if above else 'at least'} {least:g}" + (f" and at most {most:g}" if most < math.inf else "")
     raise FemInputError(f"{name} out of range", where=where, value=value, advice=f"give a number {bound}")

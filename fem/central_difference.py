@@ -9,6 +9,7 @@ ring-downs of slender structures need steps a thousand times smaller than those 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -46,8 +47,10 @@ class ExplicitSettings:
     solver: str = "auto"
 
     def __post_init__(self) -> None:
-        if not self.time_step > 0.0:
-            raise FemInputError("time step must be positive", where="explicit transient", value=self.time_step)
+        if not 0.0 < self.time_step < math.inf:
+            raise FemInputError(
+                "time step must be positive and finite", where="explicit transient", value=self.time_step
+            )
         if not 0.0 < self.safety <= 1.0:
             raise FemInputError("safety must lie in (0, 1]", where="explicit transient", value=self.safety)
 

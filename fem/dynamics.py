@@ -8,7 +8,9 @@ import numpy as np
 
 from fem.arrays import FloatArray
 from fem.contact import ContactState
+from fem.errors import FemInputError
 from fem.excitation import SupportMotion, TimeLoad
+from fem.finite_values import finite_array
 from fem.linear_operators import LinearOperators
 from fem.linear_solver import make_solver
 from fem.model import Model
@@ -33,6 +35,9 @@ class Dynamics:
         loads: Sequence[TimeLoad] = (),
         motions: Sequence[SupportMotion] = (),
     ) -> None:
+        equilibrium.check_belongs(model)
+        _check_time_functions(model, loads, TimeLoad, "time_load")
+        _check_time_functions(model, motions, SupportMotion, "support_motion")
         self.model, self.equilibrium, self.loads, self.motions = model, equilibrium, tuple(loads), tuple(motions)
         self.alpha, self.beta = damping.alpha, damping.beta
         self.mask = model.free[:, None].astype(float)
@@ -114,12 +119,11 @@ class Dynamics:
 
         step : s, over which the rates of moving supports are taken.
         """
+        displacement, velocity, slip = self._checked(displacement, velocity, slip)
         n_case = displacement.shape[1]
         moved_v, moved_a = self._support_rates(step, n_case)
         u = self.equilibrium.u[:, None] + displacement * self.mask
         v = velocity * self.mask + moved_v
-        if slip is None:
-            slip = np.repeat(self.equilibrium.contact.slip, n_case, axis=2)
         contact = self.contact(u, slip)
         force, viscous, _ = self.forces(u, v, contact)
         net = (self.load(0.0, n_case) - force - viscous - self.damping(v) - self.mass(moved_a)) * self.mask
@@ -128,6 +132,24 @@ class Dynamics:
         direct.analyse(mass)
         direct.factor(mass)
         return self.at_rest(u, v, direct.solve(net) + moved_a, (force, viscous), contact)
+
+    def _checked(
+        self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The start as finite arrays of one number of cases, with the slip of the equilibrium where none is given."""
+        where, n_dof = "start of the motion", self.model.n_dof
+        advice = f"give ({n_dof}, n_case) numbers: one column for each case"
+        displacement = finite_array(displacement, (n_dof, -1), "the displacement", where=where, advice=advice)
+        shape = displacement.shape
+        velocity = finite_array(velocity, shape, "the velocity", where=where, advice=f"give {shape} numbers")
+        if slip is None:
+            return displacement, velocity, np.repeat(self.equilibrium.contact.slip, shape[1], axis=2)
+        shape = (self.model.contact.n_point, 2, shape[1])
+        return (
+            displacement,
+            velocity,
+            finite_array(slip, shape, "the slip", where=where, advice=f"give {shape} numbers"),
+        )
 
     def _support_rates(self, step: float, n_case: int) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration (n_dof, n_case) of the supports at t = 0."""
@@ -163,3 +185,14 @@ class Dynamics:
         """Kinetic, strain and contact energy, (3, n_case) J, with M v as the scheme sees it."""
         kinetic = 0.5 * np.einsum("nc,nc->c", state.v, inertia_v)
         return np.stack([kinetic, strain, self.model.contact.stored_energy(contact.traction)])
+
+
+def _check_time_functions(
+    model: Model, given: Sequence[object], kind: type[TimeLoad | SupportMotion], door: str
+) -> None:
+    """Refuse what follows no function of time, or belongs to another model."""
+    for item in given:
+        if not isinstance(item, kind):
+            advice = f"make it with {door}(model, ...)"
+            raise FemInputError(f"not a {kind.__name__}", where="transient", value=type(item).__name__, advice=advice)
+        finite_array(item.pattern, (model.n_dof,), "the nodal pattern", where=item.name)

@@ -20,7 +20,7 @@ _TIED = 1e-3
 """Slave nodes are tied up to this share of the mean facet size away from the master: surfaces that touch."""
 
 
-def write_inp(path: Path, model: Model) -> None:
+def write_inp(path: Path | str, model: Model) -> None:
     """Write everything of a model but its loads and steps: append those, with ``nodal_loads``.
 
     Bodies become element sets of their names and sections; a surface or node set b of body a becomes a_b. Supports
@@ -32,6 +32,7 @@ def write_inp(path: Path, model: Model) -> None:
     FemInputError : HEX27 cells, which CalculiX does not have, an initial stress, bolts, springs, point masses,
         supports that move.
     """
+    path = Path(path)
     _check(path, model)
     path.write_text("\n".join([*_mesh(model), *_materials(model), *_supports(model), *_joints(model), ""]))
 

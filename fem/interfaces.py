@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import scipy.sparse as sp
 
 from fem.arrays import FloatArray, IntArray
 from fem.body import Body, locate
+from fem.bounds import require
 from fem.contact import Contact, ContactLaw, contact_pair
 from fem.errors import FemInputError
 from fem.pairing import mean_size
@@ -63,6 +65,11 @@ def default_penalty(body: Body, facets: IntArray) -> float:
 
 def pair_contact(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, pair: Pair) -> Contact:
     """The contact points of a pair; unknown names and surfaces that do not meet raise ``FemInputError``."""
+    where = f"joint {pair.name}"
+    require(where, "friction", pair.friction, 0.0)
+    for name in ("normal_penalty", "tangential_penalty"):
+        if getattr(pair, name) is not None:
+            require(where, name, getattr(pair, name), 0.0, above=True)
     default = _penalty(bodies, pair)
     law = ContactLaw(
         default if pair.normal_penalty is None else pair.normal_penalty,
@@ -74,6 +81,8 @@ def pair_contact(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, 
 
 def tie_bond(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, tie: Tie) -> Contact:
     """The points of a tie with its penalty in both directions; friction plays no part."""
+    if tie.penalty is not None:
+        require(f"joint {tie.name}", "penalty", tie.penalty, 0.0, above=True)
     penalty = _penalty(bodies, tie) if tie.penalty is None else tie.penalty
     return _joined(bodies, offsets, points, tie, ContactLaw(penalty, penalty, 0.0))
 
@@ -85,8 +94,10 @@ def bond_stiffness(bond: Contact) -> sp.csr_matrix:
 
 
 def _penalty(bodies: Sequence[Body], joint: Pair | Tie) -> float:
-    if not joint.stiffness > 0.0:
-        raise FemInputError("stiffness must be positive", where=f"joint {joint.name}", value=joint.stiffness)
+    if not 0.0 < joint.stiffness < math.inf:
+        raise FemInputError("stiffness must be positive and finite", where=f"joint {joint.name}", value=joint.stiffness)
+    if joint.reach is not None:
+        require(f"joint {joint.name}", "reach", joint.reach, 0.0, above=True)
     index, slave = locate(bodies, joint.slave)
     return joint.stiffness * default_penalty(bodies[index], bodies[index].mesh.surface(slave))
 

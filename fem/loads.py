@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from fem.arrays import FloatArray, IntArray
 from fem.body import Body, locate
 from fem.errors import FemInputError
+from fem.finite_values import finite_number, finite_vector
 from fem.locate_point import cell_of_point
 from fem.pairing import surface_points
 
@@ -100,29 +101,32 @@ def load_vector(load: Load, assembly: Assembly) -> FloatArray:
 
 
 def _nodal(load: Load, assembly: Assembly) -> FloatArray:
+    where = f"load {load.name}"
     if isinstance(load, Clamp | Pressure):
         return _pressure(load, assembly)
     if isinstance(load, Gravity):
         return _gravity(load, assembly)
     if isinstance(load, PointForce):
-        found = cell_of_point(assembly.bodies, assembly.offsets, load.point, where=f"load {load.name}")
+        found = cell_of_point(assembly.bodies, assembly.offsets, load.point, where=where)
         nodal = np.zeros((len(assembly.points), 3))
-        nodal[found.nodes] = np.outer(found.shape, load.force)
+        nodal[found.nodes] = np.outer(found.shape, finite_vector(load.force, "the load", where=where))
         return nodal
     share = nodal_share(assembly, load.region)
     if isinstance(load, Force):
-        return np.outer(share / share.sum(), load.total)
+        return np.outer(share / share.sum(), finite_vector(load.total, "the load", where=where))
     if not _extended(assembly, load.region):
         advice = "use Force for single points"
-        raise FemInputError("neither a surface nor a line", where=f"load {load.name}", value=load.region, advice=advice)
-    return np.outer(share, load.density)
+        raise FemInputError("neither a surface nor a line", where=where, value=load.region, advice=advice)
+    return np.outer(share, finite_vector(load.density, "the load", where=where))
 
 
 def _pressure(load: Clamp | Pressure, assembly: Assembly) -> FloatArray:
     index, surface = locate(assembly.bodies, load.surface)
     facets = assembly.bodies[index].mesh.surface(surface) + assembly.offsets[index]
     at = surface_points(assembly.points, facets)
-    pressure = load.pressure if isinstance(load, Pressure) else load.total_force / at.area.sum()
+    given = load.pressure if isinstance(load, Pressure) else load.total_force
+    given = finite_number(given, "the load", where=f"load {load.name}")
+    pressure = given if isinstance(load, Pressure) else given / at.area.sum()
     density = -pressure * at.area[:, None] * at.normals
     nodal = np.zeros((len(assembly.points), 3))
     np.add.at(nodal, at.nodes, at.shape[:, :, None] * density[:, None, :])
@@ -131,11 +135,12 @@ def _pressure(load: Clamp | Pressure, assembly: Assembly) -> FloatArray:
 
 def _gravity(load: Gravity, assembly: Assembly) -> FloatArray:
     names = [body.name for body in assembly.bodies]
+    acceleration = finite_vector(load.acceleration, "the acceleration", where=f"load {load.name}")
     for name in load.bodies:
         if name not in names:
             advice = f"bodies are {', '.join(names)}"
             raise FemInputError("unknown body", where=f"load {load.name}", value=name, advice=advice)
-    force = (assembly.mass @ np.tile(np.asarray(load.acceleration, dtype=float), len(assembly.points))).reshape(-1, 3)
+    force = (assembly.mass @ np.tile(acceleration, len(assembly.points))).reshape(-1, 3)
     for body, offset in zip(assembly.bodies, assembly.offsets, strict=True):
         if load.bodies and body.name not in load.bodies:
             force[int(offset) : int(offset) + len(body.mesh.points)] = 0.0

@@ -11,6 +11,7 @@ from fem.arrays import FloatArray, IntArray
 from fem.body import Body
 from fem.element import ReferenceElement, reference_element
 from fem.errors import FemInputError
+from fem.finite_values import finite_vector
 
 _NEIGHBOURS = 27
 _OUTSIDE = 0.02
@@ -30,7 +31,7 @@ def cell_of_point(bodies: Sequence[Body], offsets: IntArray, point: Sequence[flo
 
     A point outside all bodies raises ``FemInputError`` with the nearest node; ``where`` says who asks.
     """
-    place = np.array(point, dtype=float)
+    place = finite_vector(point, "the point", where=where)
     found = [_closest(body, place) for body in bodies]
     outside, nodes, shape = min(
         ((miss, n + offset, s) for (miss, n, s), offset in zip(found, offsets, strict=True)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fem.errors import FemInputError
@@ -23,12 +24,14 @@ class Material:
     density: float
 
     def __post_init__(self) -> None:
-        if not self.young_modulus > 0.0:
-            raise FemInputError("Young's modulus must be positive", where="material", value=self.young_modulus)
+        if not 0.0 < self.young_modulus < math.inf:
+            raise FemInputError(
+                "Young's modulus must be positive and finite", where="material", value=self.young_modulus
+            )
         if not -1.0 < self.poisson_ratio < 0.5:
             raise FemInputError("Poisson's ratio must lie in (-1, 0.5)", where="material", value=self.poisson_ratio)
-        if not self.density > 0.0:
-            raise FemInputError("density must be positive", where="material", value=self.density)
+        if not 0.0 < self.density < math.inf:
+            raise FemInputError("density must be positive and finite", where="material", value=self.density)
 
     @property
     def lame_lambda(self) -> float:

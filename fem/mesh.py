@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.element import reference_element
 from fem.errors import FemInputError
+from fem.finite_values import as_numbers
 
 SKIN = "skin"
 """Every mesh has this surface: all its outer faces."""
@@ -39,6 +41,14 @@ class Mesh:
     node_sets: dict[str, IntArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "points", as_numbers(self.points, "the table of points", where="mesh"))
+        object.__setattr__(self, "cells", _node_numbers(self.cells, "cells"))
+        for group in ("surfaces", "node_sets"):
+            named = {name: _node_numbers(nodes, name) for name, nodes in getattr(self, group).items()}
+            object.__setattr__(self, group, named)
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            advice = "a mesh needs (n_node, 3) coordinates"
+            raise FemInputError("not a table of points", where="mesh", value=self.points.shape, advice=advice)
         n_local = len(reference_element(self.element).nodes)
         if self.cells.ndim != 2 or len(self.cells) == 0 or self.cells.shape[1] != n_local:
             advice = f"a mesh of {self.element} needs (n_cell, {n_local}) node numbers"
@@ -111,6 +121,14 @@ class Mesh:
         facets = skin[chosen[skin].all(axis=1)]
         surfaces = self.surfaces | ({name: facets} if len(facets) else {})
         return replace(self, surfaces=surfaces, node_sets=self.node_sets | {name: np.flatnonzero(chosen)})
+
+
+def _node_numbers(value: npt.ArrayLike, name: str) -> IntArray:
+    """An array of whole numbers; anything else raises ``FemInputError``."""
+    numbers = as_numbers(value, f"the table of {name}", where="mesh")
+    if not np.array_equal(numbers, np.rint(numbers)):
+        raise FemInputError("node numbers must be whole", where="mesh", value=name)
+    return np.asarray(value, dtype=np.int64)
 
 
 def within(

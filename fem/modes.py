@@ -9,7 +9,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from fem.arrays import FloatArray
+from fem.bounds import require
 from fem.errors import FemConvergenceError, FemInputError
+from fem.finite_values import finite_array
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.preload import StaticState
@@ -67,6 +69,9 @@ def solve_modes(
     holds raises ``FemInputError``, an unstable equilibrium ``FemConvergenceError``. With a positive shift, of the order
     of the lowest elastic frequency, free bodies are allowed: their rigid modes come out with omega = 0 within roundoff.
     """
+    state.check_belongs(model)
+    require("modes", "count", count, 1, most=int(model.free.sum()) - 1)
+    require("modes", "shift_hz", shift_hz, 0.0)
     if shift_hz == 0.0:
         check_restraint(model)
     elastic = model.elastic_tangent(state.u)
@@ -109,8 +114,15 @@ def rayleigh(modes: ModalBasis, which: tuple[int, int], ratios: tuple[float, flo
     2 zeta_j omega_j = alpha + beta kappa_j with kappa_j = phi_j' K phi_j and K the material tangent: omega_j^2 less
     the shares of contact and stress stiffening.
     """
-    kappa = modal_stiffness(modes)[list(which)]
-    right = 2.0 * np.array(ratios) * modes.omega[list(which)]
+    chosen = [int(mode) for mode in finite_array(which, (2,), "the pair of modes", where="damping")]
+    if min(chosen) < 0 or max(chosen) >= len(modes.omega):
+        raise FemInputError(
+            "no such mode", where="damping", value=which, advice=f"modes are 0 to {len(modes.omega) - 1}"
+        )
+    kappa = modal_stiffness(modes)[chosen]
+    if kappa[0] == kappa[1]:
+        raise FemInputError("two different modes are needed", where="damping", value=which)
+    right = 2.0 * finite_array(ratios, (2,), "the pair of ratios", where="damping") * modes.omega[chosen]
     alpha, beta = np.linalg.solve(np.column_stack([np.ones(2), kappa]), right)
     if alpha < 0.0 or beta < 0.0:
         advice = "choose ratios that C = alpha M + beta K can reach with positive coefficients"

@@ -11,6 +11,7 @@ from fem.arrays import FloatArray
 from fem.bounds import require
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
+from fem.finite_values import as_numbers, finite_array
 from fem.model import Model
 from fem.newton import LoadStep, Target, Tolerance, internal_force
 from fem.rigid_motion import check_restraint, loose_bodies, loose_motion
@@ -39,6 +40,16 @@ class StaticState:
     load_factors: tuple[float, ...]
     residuals: tuple[float, ...]
     dissipated: FloatArray | None = None
+
+    def check_belongs(self, model: Model) -> None:
+        """Raise ``FemInputError`` where this is no state of the model: other nodes or contact points."""
+        wanted, seen = (model.n_dof, model.contact.n_point), (np.size(self.u), len(self.contact.slip))
+        if wanted != seen:
+            value = (
+                f"{seen[0]} degrees of freedom and {seen[1]} contact points, the model has {wanted[0]} and {wanted[1]}"
+            )
+            raise FemInputError("the state belongs to another model", where="equilibrium", value=value)
+        finite_array(self.u, (model.n_dof,), "the displacement", where="equilibrium")
 
 
 @dataclass(frozen=True)
@@ -108,9 +119,22 @@ def solve_preload(
 
 def lock_bolts(model: Model, shortening: FloatArray) -> Model:
     """The model with its bolts shortened by (n_bolt,) m for good: their pull joins the load."""
+    shortening = finite_array(shortening, (len(model.bolts.bolts),), "the shortening", where="bolts")
     change = shortening - model.bolts.shortening
-    bolts = replace(model.bolts, shortening=np.asarray(shortening, dtype=float))
+    bolts = replace(model.bolts, shortening=shortening)
     return replace(model, load=model.load - change @ model.bolts.pull, bolts=bolts)
+
+
+def nodal_load(model: Model, load: FloatArray) -> FloatArray:
+    """The load (n_dof,) N; another shape and numbers that are not finite raise ``FemInputError``."""
+    given = as_numbers(load, "the load", where="load")
+    if given.shape != (model.n_dof,):
+        advice = f"give {model.n_dof} nodal forces, such as model.load"
+        raise FemInputError("the load has the wrong shape", where="load", value=given.shape, advice=advice)
+    if not np.isfinite(given).all():
+        node, axis = divmod(int(np.flatnonzero(~np.isfinite(given))[0]), 3)
+        raise FemInputError("the load is not finite", where=f"node {node}, direction {'xyz'[axis]}")
+    return given
 
 
 class _Loading:
@@ -120,9 +144,9 @@ class _Loading:
         self, model: Model, load: FloatArray, settings: StaticSettings, start: StaticState | None, *, tightened: bool
     ) -> None:
         check_restraint(model)
-        if not np.isfinite(load).all():
-            node, axis = divmod(int(np.flatnonzero(~np.isfinite(load))[0]), 3)
-            raise FemInputError("the load is not finite", where=f"node {node}, direction {'xyz'[axis]}")
+        load = nodal_load(model, load)
+        if start is not None:
+            start.check_belongs(model)
         self._model, self._load, self._settings, self._tightened = model, load, settings, tightened
         self._fresh = start is None
         self._u = np.zeros(model.n_dof) if start is None else start.u

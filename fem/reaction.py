@@ -8,6 +8,7 @@ import numpy as np
 
 from fem.arrays import FloatArray, IntArray
 from fem.body import locate
+from fem.finite_values import finite_vector
 from fem.model import Model
 from fem.newton import internal_force
 from fem.preload import StaticState
@@ -29,7 +30,9 @@ def reaction_moment(
     M = sum of (x + u - about) x R.
     """
     nodes, forces = _nodal(model, state, region, load_factor)
-    arms = model.points[nodes] + state.u.reshape(-1, 3)[nodes] - np.asarray(about, dtype=float)
+    arms = (
+        model.points[nodes] + state.u.reshape(-1, 3)[nodes] - finite_vector(about, "the point", where="reaction moment")
+    )
     return np.asarray(np.cross(arms, forces).sum(axis=0))
 
 

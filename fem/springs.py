@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from fem.arrays import FloatArray, IntArray
 from fem.body import locate
 from fem.errors import FemInputError
+from fem.finite_values import finite_number, finite_vector
 from fem.interfaces import default_penalty
 from fem.loads import Assembly, Vector
 from fem.locate_point import cell_of_point
@@ -111,13 +112,19 @@ def spring_set(elastic: Sequence[Elastic], assembly: Assembly) -> SpringSet:
 
 
 def _bed(bed: Foundation, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArray, FloatArray]:
+    where = f"spring {bed.name}"
     index, surface = locate(assembly.bodies, bed.surface)
     body, offset = assembly.bodies[index], assembly.offsets[index]
     facets = body.mesh.surface(surface)
     at = surface_points(assembly.points, facets + offset)
-    normal = RIGID * default_penalty(body, facets) if bed.normal is None else bed.normal
+    normal = (
+        RIGID * default_penalty(body, facets)
+        if bed.normal is None
+        else finite_number(bed.normal, "normal", where=where)
+    )
+    tangential = finite_number(bed.tangential, "tangential", where=where)
     frame = np.stack([at.normals, *_tangents(at.normals)], axis=1)
-    k = at.area[:, None] * np.array([normal, bed.tangential, bed.tangential])
+    k = at.area[:, None] * np.array([normal, tangential, tangential])
     rows = np.repeat(np.arange(3 * len(at.area)), 3 * at.nodes.shape[1])
     columns = np.broadcast_to((3 * at.nodes[:, None, :, None] + np.arange(3)), (*frame.shape[:2], at.nodes.shape[1], 3))
     values = at.shape[:, None, :, None] * frame[:, :, None, :]
@@ -139,7 +146,7 @@ def _spring(spring: Spring, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArr
     operator = _point_rows(spring.point, assembly, where)
     if spring.to is not None:
         operator = operator - _point_rows(spring.to, assembly, where)
-    return operator, np.asarray(spring.stiffness, dtype=float), np.eye(3)
+    return operator, finite_vector(spring.stiffness, "the stiffness", where=where), np.eye(3)
 
 
 def _point_rows(point: Vector, assembly: Assembly, where: str) -> sp.csr_matrix:
@@ -158,7 +165,7 @@ def point_mass_matrix(masses: Sequence[PointMass], assembly: Assembly) -> sp.csr
     total = sp.csr_matrix((n_dof, n_dof))
     for item in masses:
         where = f"point mass {item.name}"
-        if not (np.isfinite(item.mass) and item.mass > 0.0):
+        if not finite_number(item.mass, "the mass", where=where) > 0.0:
             raise FemInputError("mass must be positive", where=where, value=item.mass)
         rows = _point_rows(item.point, assembly, where)
         total = total + item.mass * (rows.T @ rows)

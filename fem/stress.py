@@ -11,6 +11,8 @@ from fem.arrays import FloatArray
 from fem.assembly import physical_gradients
 from fem.body import Body
 from fem.element import ReferenceElement, reference_element
+from fem.errors import FemInputError
+from fem.finite_values import finite_array
 from fem.loads import Vector
 from fem.locate_point import cell_of_point
 from fem.model import Model
@@ -44,7 +46,10 @@ def integration_point_stress(model: Model, u: FloatArray, body: str) -> Stress:
 
     u (n_dof,) m.
     """
-    index = [b.name for b in model.bodies].index(body)
+    names = [b.name for b in model.bodies]
+    if body not in names:
+        raise FemInputError("unknown body", where="stress", value=body, advice=f"bodies are {', '.join(names)}")
+    index = names.index(body)
     return _at_points(model.bodies[index], _displacement(model, u, index))
 
 
@@ -68,16 +73,19 @@ def point_stress(model: Model, u: FloatArray, points: Sequence[Vector]) -> Stres
 
     A point outside all bodies raises ``FemInputError`` with the nearest node.
     """
+    advice = "give (n_point, 3) numbers, one point as [(x, y, z)]"
+    places = finite_array(points, (-1, 3), "the table of points", where="stress", advice=advice)
     nodal = nodal_stress(model, u)
-    tensors = np.empty((2, len(points), 3, 3))
-    for number, point in enumerate(points):
+    tensors = np.empty((2, len(places), 3, 3))
+    for number, point in enumerate(places):
         found = cell_of_point(model.bodies, model.offsets, point, where=f"stress at point {number}")
         for kind, tensor in enumerate((nodal.second_piola, nodal.cauchy)):
             tensors[kind, number] = np.einsum("a,aij->ij", found.shape, tensor[found.nodes])
-    return Stress(np.asarray(points, dtype=float), tensors[0], tensors[1])
+    return Stress(places, tensors[0], tensors[1])
 
 
 def _displacement(model: Model, u: FloatArray, index: int) -> FloatArray:
+    u = finite_array(u, (model.n_dof,), "the displacement", where="stress")
     start = int(model.offsets[index])
     return u.reshape(-1, 3)[start : start + len(model.bodies[index].mesh.points)]
 

@@ -7,6 +7,7 @@ comes back to the uniform output grid by itself (``step_control``).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -78,15 +79,18 @@ class TransientSettings:
     max_doublings: int = 0
 
     def __post_init__(self) -> None:
-        if not self.time_step > 0.0:
-            raise FemInputError("time step must be positive", where="transient", value=self.time_step)
+        if not 0.0 < self.time_step < math.inf:
+            raise FemInputError("time step must be positive and finite", where="transient", value=self.time_step)
         for name, least in (("depth", 1), ("max_iterations", 1), ("max_cutbacks", 0), ("max_doublings", 0)):
             require("transient", name, getattr(self, name), least)
+        for name in ("corrected_modes", "refactor_above"):
+            require("transient", name, getattr(self, name), 0)
         require("transient", "tolerance", self.tolerance, 0.0, above=True)
+        require("transient", "spectral_radius", self.spectral_radius, 0.0, most=1.0)
         if self.method not in METHODS:
             advice = f"choose one of {', '.join(METHODS)}"
             raise FemInputError("unknown method", where="transient", value=self.method, advice=advice)
-        if self.error_tolerance is not None and not self.error_tolerance > 0.0:
+        if self.error_tolerance is not None and not 0.0 < self.error_tolerance < math.inf:
             raise FemInputError("error tolerance must be positive", where="transient", value=self.error_tolerance)
 
 
@@ -118,6 +122,8 @@ class Transient:
         base_acceleration: Amplitude | None = None,
         base_direction: str = "y",
     ) -> None:
+        if force_scale is not None:
+            require("transient", "force_scale", force_scale, 0.0, above=True)
         self.model, self.equilibrium, self.settings = model, equilibrium, settings
         self.scheme = Scheme.from_radius(settings.spectral_radius)
         base = () if base_acceleration is None else (base_load(model, base_direction, base_acceleration),)
