@@ -15,7 +15,7 @@ import numpy as np
 
 from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
-from romgen.jackknife import jackknife_deviation
+from romgen.jackknife import BLOCKS, jackknife_deviation
 from romgen.normal_form import with_replicates
 from romgen.resonance import ResonanceTable
 from romgen.shooting_start import Start, regression, samples
@@ -30,20 +30,15 @@ class LinearReference:
 
     Attributes
     ----------
-    eigenvalues : (m,) 1/s.
-    without : (n_block, m) the same without each block of samples, see ``jackknife``.
+    eigenvalues : (m,) 1/s; spread : (m,) standard deviations of Re and Im by the jackknife, 1/s.
+    without : (n_block, m) the eigenvalues without each block of samples, see ``jackknife``.
     origin : "small motions", "all amplitudes", "the direct fit", or "given".
     """
 
     eigenvalues: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
+    spread: ComplexArray = field(metadata={"unit": "1/s", "axes": "mode"})
     without: ComplexArray = field(metadata={"unit": "1/s", "axes": "block,mode"})
     origin: str
-
-    @property
-    def spread(self) -> ComplexArray:
-        """Standard deviations (m,) of Re and Im by the jackknife, 1/s."""
-        spread: ComplexArray = jackknife_deviation(self.without.real) + 1j * jackknife_deviation(self.without.imag)
-        return spread
 
 
 def linear_reference(
@@ -68,22 +63,28 @@ def linear_reference(
         others = with_replicates(start.direct, seen, ridge, keep_linear=keep_linear).replicates
         assert others is not None
         origin = "given" if keep_linear else "the direct fit"
-        return LinearReference(start.dynamics.eigenvalues, others.eigenvalues, origin)
-    Z, Z_dot, block = samples(start, training, kept)
+        return LinearReference(start.dynamics.eigenvalues, _spread(others.eigenvalues), others.eigenvalues, origin)
+    n_block, given = BLOCKS * len(training), start.dynamics.eigenvalues
     if keep_linear:
-        return LinearReference(
-            start.dynamics.eigenvalues, np.tile(start.dynamics.eigenvalues, (block.max() + 1, 1)), "given"
-        )
-    enough = (
-        SMALL_PERIODS * 2.0 * np.pi / start.dynamics.eigenvalues.imag.min() / min(r.t[1] - r.t[0] for r in training)
-    )
+        return LinearReference(given, np.zeros_like(given), np.tile(given, (n_block, 1)), "given")
+    Z, Z_dot, block = samples(start, training, kept)
+    enough = SMALL_PERIODS * 2.0 * np.pi / given.imag.min() / min(r.t[1] - r.t[0] for r in training)
 
     def over(chosen: BoolArray) -> tuple[ComplexArray, bool]:
         return _small_eigenvalues(start, (Z[chosen], Z_dot[chosen]), table, enough)
 
     eigenvalues, is_small = over(np.ones(len(block), dtype=bool))
-    without = np.array([over(block != b)[0] for b in np.unique(block)])
-    return LinearReference(eigenvalues, without, "small motions" if is_small else "all amplitudes")
+    counted = np.unique(block)
+    # a block that is held out or distorted throughout has no part in the eigenvalues
+    without = np.tile(eigenvalues, (n_block, 1))
+    without[counted] = [over(block != b)[0] for b in counted]
+    origin = "small motions" if is_small else "all amplitudes"
+    return LinearReference(eigenvalues, _spread(without[counted]), without, origin)
+
+
+def _spread(without: ComplexArray) -> ComplexArray:
+    spread: ComplexArray = jackknife_deviation(without.real) + 1j * jackknife_deviation(without.imag)
+    return spread
 
 
 def _small_eigenvalues(

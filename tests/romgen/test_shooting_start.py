@@ -120,6 +120,19 @@ def test_motions_that_disagree_about_the_limit_of_small_motions_loosen_the_tie()
     assert same.spread[0].imag < 0.1 * differing.spread[0].imag
 
 
+def test_blocks_that_are_distorted_throughout_still_have_a_reference() -> None:
+    """A record of six periods: a block is shorter than the distorted edge, the replicates want one for each."""
+    t = STEP * np.arange(330)
+    r = motion(np.exp(np.outer(t, LAMBDA)) * [0.05, 0.4], np.zeros(2))
+    kept = [np.ones(len(r.t), dtype=bool)]
+    start = band_passed(fit_normal_form([r], 3, (1, 2), 1e-8).dynamics, [r])
+    table = resonance_table(start.dynamics.eigenvalues, 3, (1, 2))
+    reference = linear_reference(start, [r], kept, table, (1e-8, False))
+    assert reference.without.shape == (8, 2)
+    assert np.array_equal(reference.without[0], reference.eigenvalues)
+    assert np.all(np.isfinite(reference.spread))
+
+
 def test_motions_that_end_while_they_are_large_tie_the_linear_part_to_all_amplitudes() -> None:
     """After 1.5 s mode 1 is at a quarter of its start, not below 0.15."""
     t = STEP * np.arange(751)
