@@ -33,7 +33,7 @@ def simulate(
     z0 : (m,) state at t[0].
     u : (n_time, n_input) samples of the inputs at t, or None without load.
     hold : u between samples: held, or piecewise linear.
-    max_step : largest internal step in s, default min(1e-4, 1/(20 f_max)).
+    max_step : largest internal step in s, default ``largest_step``.
 
     Returns
     -------

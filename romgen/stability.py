@@ -3,6 +3,8 @@
 From states on the boundary of the range, scaled by a factor, the model runs freely over HORIZON time constants of its
 slowest mode. With the distance d of ``trained_range`` a motion decays when d has fallen below DECAYED of its start; its
 mean rate is ln(d(0) / d(T)) / T. A linear model has exp(-HORIZON) left.
+
+Motions are followed by the scheme of ``variational``, whose steps are a good part of a period.
 """
 
 from __future__ import annotations
@@ -13,16 +15,23 @@ import numpy as np
 from scipy.stats import qmc
 
 from romgen.arrays import ComplexArray, FloatArray
-from romgen.etdrk4 import march
-from romgen.polynomial import PolynomialMap
+from romgen.errors import NumericalError
+from romgen.polynomial import PolynomialMap, jacobian, zeta
 from romgen.trained_range import TrainedRange
+from romgen.variational import motion
 
 HORIZON, DECAYED = 2.0, 0.5
 # Distances of the starts: the boundary of the range, and how far stability reaches beyond it.
 FACTORS = (1.0, 1.25, 1.5, 2.0)
 STARTS = 72
-# Internal steps per period of the fastest mode, and intervals in which a motion is stored.
-STEPS_PER_PERIOD, LOOKS = 20.0, 50
+# Internal steps per period of the fastest mode: at least, and at most where terms turn or change fast.
+FEWEST, MOST = 4.0, 20.0
+# Largest turn of a detuned term and largest change by the nonlinear rates within a step.
+LARGEST_TURN = 0.5
+# Intervals after which the step is chosen anew, and steps that a motion may take: two minutes for all of order 7.
+INTERVALS, LARGEST_COUNT = 10, 400_000
+# Distance at which a motion counts as divergent.
+LOST = 100.0
 
 
 @dataclass(frozen=True)
@@ -70,12 +79,17 @@ def tried_stability(
     eigenvalues : (m,) 1/s.
     normal_form : N, 1/s.
     factors : distances of the starts, the first 1.
+
+    Raises
+    ------
+    NumericalError : the slowest mode decays so slowly that its motions cannot be followed.
     """
     slowest = float(-eigenvalues.real.max())
-    t = np.linspace(0.0, HORIZON / slowest, LOOKS + 1)
+    horizon = HORIZON / slowest
+    _require_short(horizon, eigenvalues)
     states = boundary_states(trained, STARTS)
-    rates = np.array([[_mean_rate(eigenvalues, normal_form, trained, t, f * z) for z in states] for f in factors])
-    least = np.log(1.0 / DECAYED) / t[-1]
+    rates = np.array([_mean_rates(eigenvalues, normal_form, trained, horizon, factor * states) for factor in factors])
+    least = np.log(1.0 / DECAYED) / horizon
     return Stability(
         factor=np.array(factors),
         share=(rates >= least).mean(axis=1),
@@ -96,18 +110,50 @@ def boundary_states(trained: TrainedRange, n: int) -> ComplexArray:
     return states
 
 
-def _mean_rate(
+def _mean_rates(
     eigenvalues: ComplexArray,
     normal_form: PolynomialMap[np.complex128],
     trained: TrainedRange,
-    t: FloatArray,
-    z0: ComplexArray,
-) -> float:
-    still = np.zeros((len(t) - 1, len(z0)), dtype=np.complex128)
-    used = normal_form.coefficients.any(axis=0)
-    E, N = normal_form.exponents[used], normal_form.coefficients[:, used]
-    step = 2.0 * np.pi / (STEPS_PER_PERIOD * float(eigenvalues.imag.max()))
-    last = march(t, z0, eigenvalues, E, N, still, still, step)[-1:]
-    with np.errstate(over="ignore", invalid="ignore"):
-        d0, d = float(trained.distance(z0[None])[0]), float(trained.distance(last)[0])
-    return float(np.log(d0 / d)) / float(t[-1]) if np.isfinite(d) else float("-inf")
+    horizon: float,
+    start: ComplexArray,
+) -> FloatArray:
+    """Mean decay rates (n,) in 1/s of the motions from ``start`` (n, m), -inf where one diverges."""
+    z, terms = start.copy(), (normal_form.exponents, normal_form.coefficients)
+    interval = np.array([0.0, horizon / INTERVALS])
+    for _ in range(INTERVALS):
+        alive = np.flatnonzero(trained.distance(z) <= LOST)
+        for k, step in zip(alive, _steps(eigenvalues, normal_form, trained, z[alive]), strict=True):
+            z[k] = motion(interval, z[k], eigenvalues, terms, float(step))[1]
+    end = np.maximum(trained.distance(z), np.finfo(float).tiny)
+    rates = np.full(len(z), -np.inf)
+    kept = end <= LOST
+    rates[kept] = np.log(trained.distance(start[kept]) / end[kept]) / horizon
+    return rates
+
+
+def _steps(
+    eigenvalues: ComplexArray, normal_form: PolynomialMap[np.complex128], trained: TrainedRange, z: ComplexArray
+) -> FloatArray:
+    """Internal steps (n,) in s at the states z (n, m), by the rates of the nonlinear terms there and their detunings."""
+    m, omega = len(eigenvalues), eigenvalues.imag
+    rho = np.tile(trained.amplitude, 2)
+    slopes = jacobian(normal_form, zeta(z)) * rho / rho[:m, None]
+    net = normal_form.exponents[:, :m] - normal_form.exponents[:, m:]
+    detuning = np.abs((net @ omega)[None] - omega[:, None])[normal_form.coefficients != 0.0].max(initial=0.0)
+    rate = np.maximum(np.linalg.norm(slopes, 2, axis=(1, 2)), max(detuning, np.finfo(float).tiny))
+    turn = 2.0 * np.pi / float(omega.max())
+    steps: FloatArray = np.clip(LARGEST_TURN / rate, turn / MOST, turn / FEWEST)
+    return steps
+
+
+def _require_short(horizon: float, eigenvalues: ComplexArray) -> None:
+    count = FEWEST * horizon * float(eigenvalues.imag.max()) / (2.0 * np.pi)
+    if not count <= LARGEST_COUNT:
+        slowest = int(eigenvalues.real.argmax())
+        rate, frequency = -float(eigenvalues.real[slowest]), float(eigenvalues.imag[slowest]) / (2.0 * np.pi)
+        raise NumericalError(
+            "a mode decays so slowly that no motion of the model can be followed until it has decayed",
+            where="stability",
+            value=f"{rate:.3g} 1/s at {frequency:.6g} Hz",
+            advice="check the number of master modes and the start time, or give records in which every mode decays",
+        )

@@ -103,8 +103,10 @@ def test_sensors_are_the_composed_maps(model: ReducedModel) -> None:
 
 
 def test_largest_step() -> None:
-    assert largest_step(np.array([-1 + 2j * np.pi * 100])) == 1e-4
+    assert largest_step(np.array([-1 + 2j * np.pi * 300])) == 1e-4
     assert largest_step(np.array([-1 + 2j * np.pi * 1000])) == pytest.approx(5e-5)
+    # slow structures: a hundred steps per period
+    assert largest_step(np.array([-1 + 2j * np.pi * 0.5, -1 + 2j * np.pi])) == pytest.approx(1e-2)
 
 
 def test_divergence_is_named(model: ReducedModel) -> None:

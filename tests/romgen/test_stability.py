@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from romgen.errors import NumericalError
+from romgen.etdrk4 import march
 from romgen.polynomial import PolynomialMap
 from romgen.stability import HORIZON, STARTS, boundary_states, tried_stability
 from romgen.trained_range import box_range, trained_range
@@ -56,3 +58,27 @@ def test_starts_lie_on_the_boundary(m: int) -> None:
     assert z.shape == (STARTS, m)
     np.testing.assert_allclose(trained.distance(z), 1.0, rtol=1e-12)
     np.testing.assert_array_equal(np.count_nonzero(z[:m], axis=1), 1)
+
+
+def test_rates_are_those_of_fine_steps() -> None:
+    """A 1:2 model with strong exchange and a term off resonance, against ETDRK4 at 400 steps per period.
+
+    The fourth-order steps turn a detuned term by at most half a radian, which leaves 2e-5 of it; mean rates of ln 2
+    over two time constants then hold to 1e-4.
+    """
+    exponents = np.array([[0, 1, 1, 0], [2, 0, 0, 0], [2, 0, 1, 0], [0, 2, 0, 1], [3, 0, 0, 0]])
+    rows = np.array([[30.0 - 20.0j, 0.0, 8.0j, 0.0, 0.0], [0.0, -30.0 - 20.0j, 0.0, -4.0 + 6.0j, 9.0]])
+    normal_form = PolynomialMap(exponents, rows)
+    tried = tried_stability(LAMBDA, normal_form, TRAINED, (1.0,))
+    t = np.linspace(0.0, HORIZON / 2.0, 3)
+    still = np.zeros((2, 2), dtype=complex)
+    states = boundary_states(TRAINED, STARTS)
+    step = 2.0 * np.pi / (400.0 * LAMBDA.imag.max())
+    ends = np.array([march(t, z, LAMBDA, exponents, rows, still, still, step)[-1] for z in states])
+    rates = np.log(TRAINED.distance(states) / TRAINED.distance(ends)) / t[-1]
+    assert tried.slowest_rate[0] == pytest.approx(rates.min(), rel=1e-4)
+
+
+def test_a_mode_that_does_not_decay_is_named() -> None:
+    with pytest.raises(NumericalError, match="1e-09 1/s at 9.5493 Hz"):
+        tried_stability(np.array([-1e-9 + 60.0j, -5.0 + 121.0j]), cubic(0.0), TRAINED)
