@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,6 +55,10 @@ class SensorChart:
     delays: int
     step: float
     frequency_hz: FloatArray = field(metadata={"unit": "Hz", "axes": "mode"})
+
+    def of_modes(self, rows: Sequence[int]) -> SensorChart:
+        """Return the chart of some of its modes, by their rows."""
+        return replace(self, projection=self.projection[list(rows)], frequency_hz=self.frequency_hz[list(rows)])
 
 
 def modal_chart(trajectory: Trajectory, modes: Sequence[int]) -> ReducedTrajectory:

@@ -99,8 +99,7 @@ def learn(
     NumericalError : the data are not those of decaying oscillations.
     """
     _check(training, validation, loads, known)
-    m = len(settings.master_modes)
-    chart = None if _is_modal(training) else learn_sensor_chart(training, m)
+    chart = None if _is_modal(training) else _sensor_chart(training, settings.master_modes)
     reduced = [reduced_trajectory(trajectory, chart, settings) for trajectory in training]
     orders = choose_order(reduced, settings, known)
     fit = best_fit(reduced, orders, settings, known)
@@ -121,6 +120,11 @@ def learn(
         choice=choice_sentence(orders, fit.origin),
         notes=learning_notes([*training, *validation], chart, model, errors, fit.origin),
     )
+
+
+def _sensor_chart(training: Sequence[Trajectory], modes: Sequence[int]) -> SensorChart:
+    """Return the chart of the modes with these numbers, from 1: all up to the highest are identified."""
+    return learn_sensor_chart(training, max(modes)).of_modes([mode - 1 for mode in sorted(modes)])
 
 
 def best_fit(

@@ -235,6 +235,8 @@ def _learn_problems(study: Study) -> Iterator[str]:
     learn = study.learn
     if len(set(learn.master_modes)) < len(learn.master_modes) or not learn.master_modes:
         yield f"[learn] master_modes must differ and not be empty; got {list(learn.master_modes)}"
+    if any(mode < 1 for mode in learn.master_modes):
+        yield f"[learn] master_modes are numbers from 1; got {list(learn.master_modes)}"
     resonance = learn.internal_resonance
     if resonance not in ("auto", "gap", ()) and len(resonance) != len(learn.master_modes):
         yield f"[learn] internal_resonance needs one integer per master mode; got {list(resonance)}"

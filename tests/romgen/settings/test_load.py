@@ -124,6 +124,7 @@ MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_set("learn", to={"internal_resonance": [1, 2, 3]}), "needs one integer per master mode"),
     (_set("learn", to={"internal_resonance": "always"}), "[learn] internal_resonance:"),
     (_set("learn", to={"master_modes": [1, 1]}), "[learn] master_modes must differ"),
+    (_set("learn", to={"master_modes": [0]}), "[learn] master_modes are numbers from 1; got [0]"),
     (_set("forced_response", "sensor", to="tpi"), "unknown sensor 'tpi'; did you mean 'tip'?"),
     (_set("forced_response", "input", to="shaker"), "unknown load input 'shaker'"),
     (_set("forced_response", "measure", to="rms"), "Input should be 'max' or 'sqrt2_rms'; got 'rms'"),
