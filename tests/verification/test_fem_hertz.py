@@ -63,7 +63,7 @@ def _line_contact(case: Line, cells: tuple[int, int]) -> tuple[Model, StaticStat
     ]
     # Ten times the modulus over the facet size in the contact: penetration is then 0.5 % of the approach.
     penalty = 10.0 * case.young[0] * cells[0] / (1.3 * case.a)
-    pair = Pair("line", "upper.y_min", "lower.y_max", 0.0, penalty, penalty, reach=0.3 * case.a)
+    pair = Pair("line", "upper.y_min", "lower.y_max", 0.0, penalty, penalty)
     supports = [Support("lower.y_min", ("y",)), *[Support(f"{b}.x_min", ("x",)) for b in ("upper", "lower")]]
     supports += [Support(f"{b}.{s}", ("z",)) for b in ("upper", "lower") for s in ("z_min", "z_max")]
     return _press(bodies, pair, supports, 0.5 * case.force * THICKNESS)
@@ -109,7 +109,7 @@ def _spheres(cells: tuple[int, int], size: float, coarse: int) -> tuple[Model, S
         Body("lower", quarter(cells[1], upward=True), steel, "linear"),
     ]
     penalty = 10.0 * YOUNG * cells[0] / (1.3 * A)
-    pair = Pair("spheres", "upper.y_min", "lower.y_max", 0.0, penalty, penalty, reach=5e-6)
+    pair = Pair("spheres", "upper.y_min", "lower.y_max", 0.0, penalty, penalty)
     sides = [Support(f"{b}.{axis}_min", (axis,)) for b in ("upper", "lower") for axis in "xz"]
     return _press(bodies, pair, [Support("lower.y_min", ("y",)), *sides], FORCE / 4.0)
 
