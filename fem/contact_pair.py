@@ -46,7 +46,7 @@ def pair_reach(points: FloatArray, slave: IntArray, master: IntArray, given: flo
     wide = max(WIDE * size, close)
     if given is not None:
         return Reach(given, given, max(2.0 * given, wide))
-    return Reach(close if bonded else wide, close, wide if bonded else 2.0 * wide)
+    return Reach(close if bonded else wide, close, 2.0 * wide)
 
 
 def contact_pair(
@@ -73,11 +73,13 @@ def contact_pair(
     target = _partners(points, source, master, limit)
     gap = np.einsum("gi,gi->g", source.points - target.points, target.normals)
     distance = np.linalg.norm(source.points - target.points, axis=1)
-    near = target.found & (distance <= np.where(gap > 0.0, limit.front, limit.depth))
+    faces = np.flatnonzero(target.found)
+    faces = faces[~_behind_itself(points, slave, source.taken(faces), gap[faces], 0.01 * limit.depth)]
+    near = np.zeros(len(gap), dtype=bool)
+    near[faces] = (distance <= np.where(gap > 0.0, limit.front, limit.depth))[faces]
     if not near.any():
-        raise _nothing_near(name, limit, gap[target.found])
-    left = np.flatnonzero(target.found & ~near)
-    left = left[~_behind_itself(points, slave, source.taken(left), gap[left])]
+        raise _nothing_near(name, limit, gap[faces])
+    left = faces[~near[faces]]
     normal = target.normals[near]
     frame = np.stack([normal, *_tangents(normal)], axis=1)
     sizes = [facet_sizes(points, facets) for facets in surfaces]
@@ -128,10 +130,13 @@ def _nothing_near(name: str, limit: Reach, seen: FloatArray) -> FemInputError:
     return FemInputError("no slave point finds the master surface", where=where, value=limit.front, advice=advice)
 
 
-def _behind_itself(points: FloatArray, slave: IntArray, at: SurfacePoints, gap: FloatArray) -> BoolArray:
-    """True for points (n,) behind the master with the far side of the slave between: no interference, a thin part."""
+def _behind_itself(points: FloatArray, slave: IntArray, at: SurfacePoints, gap: FloatArray, least: float) -> BoolArray:
+    """True for points (n,) behind the master with the far side of the slave between: no interference, a thin part.
+
+    Points less than ``least`` m behind it are taken as they are.
+    """
     hidden = np.zeros(len(gap), dtype=bool)
-    deep = np.flatnonzero(gap < 0.0)
+    deep = np.flatnonzero(gap < -least)
     if len(deep):
         depth = float(-gap[deep].min())
         own = project(points, at.points[deep], slave, depth, facing=Facing(at.normals[deep], depth))

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bounds import require_count
 from fem.central_difference import ExplicitTransient
+from fem.finite_values import check_rows
 from fem.motion import MotionState, StepRecord
 from fem.reach import no_depth, warn_of_reach
 from fem.sliding import sliding_motion, warn_of_sliding
@@ -73,6 +75,8 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
     Issues ``SlidingWarning``, ``ReachWarning`` and ``EnergyWarning``. Raises as the march does; ``march_campaign``
     hands on what a failed march computed.
     """
+    require_count("history", "n_step", n_step, 0)
+    check_rows(sensors, transient.model.n_dof, where="history")
     contact = transient.model.contact
     last = transient.observe(state)
     rows, slid, depth = [_row(last, transient, sensors)], np.zeros(contact.n_point), no_depth(contact.left_out)

@@ -45,7 +45,8 @@ def segment_points(points: FloatArray, slave: IntArray, master: IntArray, reach:
     facet = pairs[0]
     whole = np.unique(facet[share > 1.0 - _WHOLE])
     cut = np.flatnonzero((share > _SLIVER) & ~np.isin(facet, whole))
-    cut = cut[_first_layer(facet[cut], share[cut], away[cut], 2.0 * mean_size(points, master))]
+    size = 0.5 * mean_size(points, slave)
+    cut = cut[_first_layer(facet[cut], (corners[cut], counts[cut]), share[cut], away[cut], size)]
     plain = surface_points(points, slave[whole])
     plain = replace(plain, facet=whole[plain.facet])
     if len(cut) == 0:
@@ -80,18 +81,32 @@ def _candidates(
     return (s[keep], m[keep]), away[keep]
 
 
-def _first_layer(facet: IntArray, share: FloatArray, away: FloatArray, size: float) -> BoolArray:
-    """False for pieces behind others: on facets covered more than once, what lies ``size`` m farther than a full cover.
+def _first_layer(
+    facet: IntArray, pieces: tuple[FloatArray, IntArray], share: FloatArray, away: FloatArray, size: float
+) -> BoolArray:
+    """False for pieces that lie behind nearer ones of their slave facet.
 
-    Slave facet, share of it and distance (m) of every piece, each (n_piece,); what lies behind the slave comes last.
+    Slave facet, polygon, share of the facet and distance (m) of every piece, each (n_piece, ...). Facets are looked at
+    where pieces cover more than all of them, or differ by ``size`` m in their distance; what lies so far behind the
+    slave comes last.
     """
-    depth = np.where(away < -size, np.inf, np.abs(away))
     keep = np.ones(len(facet), dtype=bool)
-    covered = np.bincount(facet, share) if len(facet) else np.empty(0)
-    for number in np.flatnonzero(covered > 1.0 + _TWICE):
+    if not len(facet):
+        return keep
+    depth = np.where(away < -size, np.inf, np.abs(away))
+    low, high = np.full(facet.max() + 1, np.inf), np.full(facet.max() + 1, -np.inf)
+    np.minimum.at(low, facet, away)
+    np.maximum.at(high, facet, away)
+    spread = np.where(low <= high, high, 0.0) - np.where(low <= high, low, 0.0)
+    for number in np.flatnonzero((np.bincount(facet, share) > 1.0 + _TWICE) | (spread > size)):
         piece = np.flatnonzero(facet == number)
-        nearer = depth[piece][:, None] > depth[piece][None, :] + size
-        keep[piece] = nearer @ share[piece] + share[piece] <= 1.0 + _TWICE
+        piece = piece[np.argsort(depth[piece], kind="stable")]
+        for place, own in enumerate(piece):
+            nearer = piece[:place][keep[piece[:place]]]
+            polygons, counts = pieces[0][nearer].copy(), pieces[1][nearer].copy()
+            clip(polygons, counts, np.ascontiguousarray(pieces[0][own, : pieces[1][own]]))
+            covered = np.abs(areas(polygons, counts)).sum()
+            keep[own] = covered <= _TWICE * np.abs(areas(pieces[0][own : own + 1], pieces[1][own : own + 1])[0])
     return keep
 
 

@@ -29,4 +29,4 @@ from fem.arc_length import PathSettings
 def test_settings_out_of_range_are_refused(make: Callable[[], object], name: str) -> None:
     with pytest.raises(fem.FemInputError, match=f"{name} out of range") as caught:
         make()
-    assert "give a number" in str(caught.value)
+    assert "; give a " in str(caught.value)
