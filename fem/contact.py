@@ -85,12 +85,16 @@ class Contact:
         return np.ascontiguousarray(self.operator @ u)
 
     def nearest(self, relative: FloatArray) -> BoolArray:
-        """Points (n_point,) whose gap is within half a facet of the smallest of their pair; relative (3 n_point,) m."""
+        """Points (n_point,) with gaps within half a facet of the smallest of their pair; relative (3 n_point,) m.
+
+        The facet is that of the nearest point: far ones of a graded mesh are larger than the contact.
+        """
         gap = self.initial_gap + relative[::3]
         near = np.zeros(self.n_point, dtype=bool)
         for number in range(len(self.names)):
-            at = self.pair == number
-            near[at] = gap[at] <= max(gap[at].min(), 0.0) + 0.5 * self.facet_size[at]
+            at = np.flatnonzero(self.pair == number)
+            first = at[gap[at].argmin()]
+            near[at] = gap[at] <= max(gap[first], 0.0) + 0.5 * self.facet_size[first]
         return near
 
     def evaluate(self, relative: FloatArray, slip: FloatArray) -> ContactState:

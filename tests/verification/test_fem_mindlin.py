@@ -146,7 +146,7 @@ def _polar_bench(fine: tuple[float, float], cells: int) -> Bench:
     supports += [Support("lower.y_min", ("x", "y")), Support("upper.y_max", ("x", "y"))]
     # Ten times the modulus over the width of a fine ring, as in ``_bench``.
     penalty = 10.0 * YOUNG / width
-    pair = Pair("contact", "upper.y_min", "lower.y_max", MU, penalty, penalty)
+    pair = Pair("contact", "upper.y_min", "lower.y_max", MU, penalty, penalty, reach=5e-6)
     return Bench(build_model(bodies, pairs=[pair], supports=supports), spheres=True)
 
 
