@@ -219,7 +219,7 @@ def compare(name: str, joints: str, steps: int, limit_s: float) -> None:
     study = with_joints(refined(name), joints)
     model = build(study)
     pull = ACCELERATION * (model.mass @ model.direction("y")) * model.free
-    rows = sensor_rows(model, [Sensor(s, t.point, t.direction) for s, t in study.sensors.items()])
+    rows = sensor_rows(model, [Sensor(s, t.point, t.direction, t.body) for s, t in study.sensors.items()])
     case = Case(model, pull, rows, steps, study.modes.count, limit_s)
     print(f"{name}, {joints}: {model.n_dof} DOF", flush=True)
     found = ours(case)

@@ -31,6 +31,7 @@ from fem.model import Body, Model, build_model
 from fem.modes import ModalBasis, Rayleigh, no_modes, rayleigh, rest_state, solve_modes
 from fem.motion import MotionState, StepRecord
 from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
+from fem.reach import ReachWarning, TieWarning
 from fem.reaction import reaction, reaction_moment
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
@@ -70,6 +71,7 @@ __all__ = [
     "PointMass",
     "Pressure",
     "Rayleigh",
+    "ReachWarning",
     "Sensor",
     "SlidingWarning",
     "Spring",
@@ -80,6 +82,7 @@ __all__ = [
     "Support",
     "SupportMotion",
     "Tie",
+    "TieWarning",
     "TimeLoad",
     "Traction",
     "Transient",

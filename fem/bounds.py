@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
+from numbers import Integral, Real
 
 from fem.errors import FemInputError
 
@@ -15,3 +15,12 @@ def require(where: str, name: str, value: object, least: float, *, above: bool =
         return
     bound = f"{'above' if above else 'at least'} {least:g}" + (f" and at most {most:g}" if most < math.inf else "")
     raise FemInputError(f"{name} out of range", where=where, value=value, advice=f"give a number {bound}")
+
+
+def require_count(where: str, name: str, value: object, least: int, *, most: float = math.inf) -> None:
+    """Refuse a count that is not a whole number from ``least`` to ``most``; 2.5 steps, and 2.0, are none."""
+    if isinstance(value, Integral) and least <= int(value) <= most:
+        return
+    bound = f"at least {least}" + (f" and at most {most:g}" if most < math.inf else "")
+    advice = f"give a whole number {bound}"
+    raise FemInputError(f"{name} out of range", where=where, value=value, advice=advice)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
+from fem.bounds import require_count
 from fem.central_difference import ExplicitTransient
 from fem.errors import FemError, FemInputError
 from fem.modes import ModalBasis
@@ -153,6 +154,8 @@ def march_campaign(
     Nothing but the state passes from one segment to the next, so that a resumed campaign repeats the same numbers bit
     by bit.
     """
+    require_count("campaign", "n_step", n_step, 0)
+    require_count("campaign", "segment_steps", segment_steps, 1)
     rows: list[_Row] = []
     if restart is not None:
         state = restart

@@ -10,17 +10,7 @@ import scipy.sparse as sp
 from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.errors import FemInputError
 from fem.friction import traction_tangents, tractions
-from fem.pairing import Projection, SurfacePoints, facet_sizes, mean_size, project
-from fem.segmentation import segment_points
-
-_FACING = 0.5
-"""Surfaces face each other where their normals are within 60 degrees of opposite."""
-
-_OVER_KINK = 0.05
-"""Share of a master facet by which the closest point may miss it where two facets meet at an angle."""
-
-_SLIDE = 0.1
-"""Slip that counts as small, in sizes of the master facet: the force is then misplaced by at most that distance."""
+from fem.reach import LeftOut, joined_left_out
 
 
 @dataclass(frozen=True)
@@ -65,6 +55,7 @@ class Contact:
     points : (n_point, 3) m; names : pairs; pair : (n_point,) index into names.
     facet_size : (n_point,) m, slave; slide_limit : (n_point,) m, slip up to which the frozen projection serves.
     frame : (n_point, 3, 3) rows normal (out of the master), tangent 1, tangent 2.
+    surface : (n_pair, 2) m^2, area of the whole slave and master; left_out : slave points beyond the reach.
     """
 
     operator: sp.csr_matrix
@@ -77,6 +68,8 @@ class Contact:
     facet_size: FloatArray
     slide_limit: FloatArray
     frame: FloatArray
+    surface: FloatArray
+    left_out: LeftOut
 
     @property
     def n_point(self) -> int:
@@ -90,6 +83,19 @@ class Contact:
     def relative(self, u: FloatArray) -> FloatArray:
         """Relative displacements B u, (3 n_point, n_case) m."""
         return np.ascontiguousarray(self.operator @ u)
+
+    def nearest(self, relative: FloatArray) -> BoolArray:
+        """Points (n_point,) with gaps within half a facet of the smallest of their pair; relative (3 n_point,) m.
+
+        The facet is that of the nearest point: far ones of a graded mesh are larger than the contact.
+        """
+        gap = self.initial_gap + relative[::3]
+        near = np.zeros(self.n_point, dtype=bool)
+        for number in range(len(self.names)):
+            at = np.flatnonzero(self.pair == number)
+            first = at[gap[at].argmin()]
+            near[at] = gap[at] <= max(gap[first], 0.0) + 0.5 * self.facet_size[first]
+        return near
 
     def evaluate(self, relative: FloatArray, slip: FloatArray) -> ContactState:
         """Tractions, new slip and status from relative displacements and the slip history."""
@@ -135,14 +141,13 @@ class Contact:
         return np.asarray(0.5 * np.repeat(self.area, 3) / stiffness @ traction**2)
 
     def dissipated(self, traction: FloatArray, slip: FloatArray, new_slip: FloatArray) -> FloatArray:
-        """Work of friction over one increment sum w tau_t . (s_p_new - s_p), (n_case,) J; open points do none."""
+        """Work of friction over one increment sum w tau_t . (s_p_new - s_p), (n_case,) J; open points do none.
+
+        The traction is that at the end of the increment, as the equation of a time step takes it: of first order where
+        the pressure changes, see ``fem.friction_work`` for load steps.
+        """
         tangential = traction.reshape(self.n_point, 3, traction.shape[1])[:, 1:, :]
         return np.asarray(np.einsum("g,gdc,gdc->c", self.area, tangential, new_slip - slip))
-
-    def dissipation_density(self, traction: FloatArray, slip: FloatArray, new_slip: FloatArray) -> FloatArray:
-        """Work of friction per area of one increment tau_t . (s_p_new - s_p), (n_point, n_case) J/m^2."""
-        tangential = traction.reshape(self.n_point, 3, traction.shape[1])[:, 1:, :]
-        return np.asarray(np.einsum("gdc,gdc->gc", tangential, new_slip - slip))
 
     def _assemble(self, blocks: FloatArray) -> sp.csr_matrix:
         index = np.arange(self.n_point)
@@ -151,51 +156,14 @@ class Contact:
         return (self.operator.T @ D.tocsr() @ self.operator).tocsr()
 
 
-def contact_pair(
-    name: str, points: FloatArray, slave: IntArray, master: IntArray, law: ContactLaw, *, reach: float | None = None
-) -> Contact:
-    """Contact between two facet sets of one model.
-
-    Parameters
-    ----------
-    points : (n_node, 3) all nodes of the model, m.
-    slave, master : (n_facet, n_face_local) global node numbers; the integration points lie on the slave.
-    reach : largest initial distance of a pair in m; default half the mean slave facet size. Slave points without a
-        partner that faces them are no contact points.
-    """
-    distance = reach if reach is not None else 0.5 * mean_size(points, slave)
-    source = segment_points(points, slave, master, distance)
-    target = project(points, source.points, master, distance, slack=_OVER_KINK)
-    paired = target.found & (np.einsum("gi,gi->g", source.normals, target.normals) < -_FACING)
-    if not paired.any():
-        advice = "check that the surfaces face each other, or enlarge the reach"
-        raise FemInputError(
-            "no slave point finds the master surface", where=f"contact {name}", value=distance, advice=advice
-        )
-    gap = np.einsum("gi,gi->g", source.points - target.points, target.normals)[paired]
-    normal = target.normals[paired]
-    frame = np.stack([normal, *_tangents(normal)], axis=1)
-    return Contact(
-        _operator(source, target, paired, frame, 3 * len(points)),
-        source.area[paired],
-        gap,
-        np.tile([law.normal_penalty, law.tangential_penalty, law.friction], (int(paired.sum()), 1)),
-        source.points[paired],
-        (name,),
-        np.zeros(int(paired.sum()), dtype=np.int64),
-        facet_sizes(points, slave)[source.facet[paired]],
-        _SLIDE * facet_sizes(points, master)[target.facet[paired]],
-        frame,
-    )
-
-
 def join(contacts: tuple[Contact, ...], n_dof: int) -> Contact:
     """All pairs of a model as one contact; none gives an empty one."""
     if not contacts:
         empty = np.empty(0)
         rows, none = np.empty((0, 3)), np.empty(0, dtype=np.int64)
-        frames = np.empty((0, 3, 3))
-        return Contact(sp.csr_matrix((0, n_dof)), empty, empty, rows, rows, (), none, empty, empty, frames)
+        frames, areas, left_out = np.empty((0, 3, 3)), np.empty((0, 2)), joined_left_out((), n_dof)
+        operator = sp.csr_matrix((0, n_dof))
+        return Contact(operator, empty, empty, rows, rows, (), none, empty, empty, frames, areas, left_out)
     return Contact(
         sp.vstack([c.operator for c in contacts], format="csr"),
         np.concatenate([c.area for c in contacts]),
@@ -207,25 +175,6 @@ def join(contacts: tuple[Contact, ...], n_dof: int) -> Contact:
         np.concatenate([c.facet_size for c in contacts]),
         np.concatenate([c.slide_limit for c in contacts]),
         np.concatenate([c.frame for c in contacts]),
+        np.concatenate([c.surface for c in contacts]),
+        joined_left_out(tuple(c.left_out for c in contacts), n_dof),
     )
-
-
-def _operator(
-    source: SurfacePoints, target: Projection, paired: BoolArray, frame: FloatArray, n_dof: int
-) -> sp.csr_matrix:
-    nodes = np.hstack([source.nodes[paired], target.nodes[paired]])
-    weight = np.hstack([source.shape[paired], -target.shape[paired]])
-    data = np.einsum("gri,ga->grai", frame, weight)
-    columns = np.broadcast_to((3 * nodes[:, :, None] + np.arange(3))[:, None], data.shape)
-    rows = np.broadcast_to(np.arange(3 * len(nodes)).reshape(-1, 3, 1, 1), data.shape)
-    matrix = sp.csr_matrix((data.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * len(nodes), n_dof))
-    matrix.eliminate_zeros()
-    return matrix
-
-
-def _tangents(normal: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit tangents; the first is the projection of the global axis farthest from the normal."""
-    axis = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    first = axis - np.einsum("gi,gi->g", axis, normal)[:, None] * normal
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return first, np.cross(normal, first)

@@ -20,7 +20,8 @@ class InterfaceState:
     (n,) 0 open, 1 stick, 2 slip; slip (n, 2) m, where the springs of stick are anchored; dissipated (n,) work of
     friction per area in J/m^2, nan where it was not kept. ``normal_force`` is the resultant of the pressure, ``force``
     (3,) that of all tractions on the master, ``applied_force`` what the loads send through the pair, nan where supports
-    on both sides, springs or a bolt leave that open; ``contact_area`` is the area of the closed points.
+    on both sides, springs or a bolt leave that open; ``contact_area`` is the area of the closed points;
+    ``paired_share`` is the share of the slave surface that has a partner within the reach at all.
     """
 
     name: str
@@ -35,6 +36,7 @@ class InterfaceState:
     normal_force: float
     applied_force: float
     contact_area: float
+    paired_share: float
 
 
 def interface_states(
@@ -64,6 +66,7 @@ def interface_states(
                 float(pressure @ area),
                 applied_force(model, number),
                 float(area[status > 0].sum()),
+                float(area.sum() / contact.surface[number, 0]),
             )
         )
     return tuple(result)

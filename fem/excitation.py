@@ -10,6 +10,7 @@ import numpy as np
 from fem.arrays import FloatArray
 from fem.body import locate
 from fem.errors import FemInputError
+from fem.finite_values import finite_array
 from fem.loads import Assembly, Load, load_vector
 from fem.model import AXES, Model
 
@@ -68,6 +69,11 @@ def support_motion(
     ----------
     directions : among "x", "y", "z"; every node of the region must be held along them by a ``Support``.
     vector : factors of the displacement, one for all directions or one for each.
+
+    Raises
+    ------
+    FemInputError : unknown names or directions, components that are not held, another number of factors, a motion that
+        does not start at 0.
     """
     index, name = locate(model.bodies, region)
     nodes = model.bodies[index].mesh.nodes(name) + model.offsets[index]
@@ -76,7 +82,11 @@ def support_motion(
     if unknown:
         raise FemInputError("unknown direction", where=where, value=unknown[0], advice="choose x, y or z")
     pattern = np.zeros(model.n_dof)
-    factors = np.broadcast_to(np.asarray(vector, dtype=float), (len(directions),))
+    advice = f"give one factor, or one for each of the {len(directions)} directions"
+    factors = finite_array(vector, (-1,), "the vector", where=where, advice=advice)
+    if len(factors) not in (1, len(directions)):
+        raise FemInputError("the vector has the wrong length", where=where, value=len(factors), advice=advice)
+    factors = np.broadcast_to(factors, (len(directions),))
     for direction, factor in zip(directions, factors, strict=True):
         dof = 3 * nodes + AXES[direction]
         if model.free[dof].any():

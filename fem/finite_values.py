@@ -43,3 +43,12 @@ def as_numbers(value: npt.ArrayLike, what: str, *, where: str) -> FloatArray:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise FemInputError(f"{what} is not made of numbers", where=where, value=repr(value)[:60]) from error
+
+
+def check_rows(rows: npt.ArrayLike, n_dof: int, *, where: str) -> FloatArray:
+    """Rows (n, n_dof) such as those of ``sensor_rows``, none allowed; anything else raises ``FemInputError``."""
+    array = as_numbers(rows, "the table of sensors", where=where)
+    if array.ndim != 2 or array.shape[1] != n_dof:
+        advice = f"give rows of {n_dof} numbers, as sensor_rows does"
+        raise FemInputError("the table of sensors has the wrong shape", where=where, value=array.shape, advice=advice)
+    return array

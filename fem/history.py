@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bounds import require_count
 from fem.central_difference import ExplicitTransient
+from fem.finite_values import check_rows
 from fem.motion import MotionState, StepRecord
+from fem.reach import no_depth, warn_of_reach
 from fem.sliding import sliding_motion, warn_of_sliding
 from fem.transient import Transient
 
@@ -69,15 +72,18 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
     ----------
     sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
 
-    Issues ``SlidingWarning`` and ``EnergyWarning``. Raises as the march does; ``march_campaign`` hands on what a failed
-    march computed.
+    Issues ``SlidingWarning``, ``ReachWarning`` and ``EnergyWarning``. Raises as the march does; ``march_campaign``
+    hands on what a failed march computed.
     """
+    require_count("history", "n_step", n_step, 0)
+    check_rows(sensors, transient.model.n_dof, where="history")
     contact = transient.model.contact
     last = transient.observe(state)
-    rows, slid = [_row(last, transient, sensors)], np.zeros(contact.n_point)
+    rows, slid, depth = [_row(last, transient, sensors)], np.zeros(contact.n_point), no_depth(contact.left_out)
     for record in transient.march(state, n_step):
         rows.append(_row(record, transient, sensors))
         slid = np.maximum(slid, sliding_motion(contact, contact.relative(record.state.u), record.contact.status))
+        depth = np.maximum(depth, contact.left_out.depth(record.state.u))
         last = record
     columns = [np.stack(column) for column in zip(*rows, strict=True)]
     motion, energies, done, force, areas = columns
@@ -99,6 +105,7 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
         state=last.resume,
     )
     warn_of_sliding(contact, slid)
+    warn_of_reach(contact.names, contact.left_out, depth)
     warn_of_imbalance(history)
     return history
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,9 +12,14 @@ import scipy.sparse as sp
 from fem.arrays import FloatArray, IntArray
 from fem.body import Body, locate
 from fem.bounds import require
-from fem.contact import Contact, ContactLaw, contact_pair
+from fem.contact import Contact, ContactLaw
+from fem.contact_pair import contact_pair
 from fem.errors import FemInputError
 from fem.pairing import mean_size
+from fem.reach import TieWarning
+
+BONDED = 0.9
+"""Share of the smaller surface of a tie below which it may hold less than was meant."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,10 @@ class Pair:
     friction : Coulomb coefficient.
     normal_penalty, tangential_penalty : Pa/m; default ``stiffness`` times ``default_penalty`` of the slave.
     stiffness : penalties in multiples of E / h. 1 adds the compliance of a layer of one facet size; 10 a tenth of it.
-    reach : largest initial distance in m at which two points are paired; default half the mean slave facet size.
+    reach : largest initial distance in m at which two points are paired, before the master and behind it. Default
+        before it a twentieth of the diagonal of the smaller surface (at least as behind it), so that refining a curved
+        contact does not cut it; behind it, for interference, half the mean slave facet size. ``ReachWarning`` says
+        where points beyond it came through.
     """
 
     name: str
@@ -45,6 +54,8 @@ class Tie:
     The bond is elastic, tau = k (u_s - u_m) in all directions and in tension too, so that it adds to the stiffness and
     no constraint enters a solver. k = ``stiffness`` E / h unless ``penalty`` (Pa/m) is given: at the default of 100 the
     bond is as compliant as a hundredth of a facet size of material. A distance between the surfaces is kept.
+    ``reach`` in m is the largest one, by default half the mean slave facet size; ``TieWarning`` says where less than
+    ``BONDED`` of the smaller surface finds a partner.
     """
 
     name: str
@@ -84,7 +95,26 @@ def tie_bond(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, tie:
     if tie.penalty is not None:
         require(f"joint {tie.name}", "penalty", tie.penalty, 0.0, above=True)
     penalty = _penalty(bodies, tie) if tie.penalty is None else tie.penalty
-    return _joined(bodies, offsets, points, tie, ContactLaw(penalty, penalty, 0.0))
+    bond = _joined(bodies, offsets, points, tie, ContactLaw(penalty, penalty, 0.0))
+    _check_bonded(tie, bond)
+    return bond
+
+
+def _check_bonded(tie: Tie, bond: Contact) -> None:
+    """Warn of a tie that holds less of both surfaces than ``BONDED``."""
+    area, (slave, master) = float(bond.area.sum()), bond.surface[0]
+    if area >= BONDED * min(slave, master):
+        return
+    beyond = float(bond.left_out.area[bond.left_out.gap > 0.0].sum()) / slave
+    far = f"{100.0 * beyond:.3g} % of the slave faces it farther than the reach of {bond.left_out.reach[0]:.3g} m"
+    warnings.warn(
+        f"tie {tie.name}: only {100.0 * area / slave:.3g} % of the slave {tie.slave} ({100.0 * area / master:.3g} % of "
+        f"the area of {tie.master}) finds a partner and is bonded; "
+        + (f"{far}: enlarge it where the gap is to be bonded" if beyond > 0.0 else "the rest faces nothing near")
+        + "; tie regions that cover each other if this is meant",
+        TieWarning,
+        stacklevel=5,
+    )
 
 
 def bond_stiffness(bond: Contact) -> sp.csr_matrix:
@@ -110,8 +140,8 @@ def _joined(
     return contact_pair(
         joint.name,
         points,
-        bodies[s].mesh.surface(slave) + offsets[s],
-        bodies[m].mesh.surface(master) + offsets[m],
+        (bodies[s].mesh.surface(slave) + offsets[s], bodies[m].mesh.surface(master) + offsets[m]),
         law,
         reach=joint.reach,
+        bonded=isinstance(joint, Tie),
     )

@@ -58,11 +58,15 @@ class Force:
 
 @dataclass(frozen=True)
 class PointForce:
-    """A dead force in N at a material point of the undeformed structure, m, which need not be a node."""
+    """A dead force in N at a material point of the undeformed structure, m, which need not be a node.
+
+    ``body`` says which one it pulls at where bodies touch in the point.
+    """
 
     name: str
     point: Vector
     force: Vector
+    body: str | None = None
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,7 @@ def load_vector(load: Load, assembly: Assembly) -> FloatArray:
 
     Raises
     ------
-    FemInputError : unknown names, a point outside all bodies, numbers that are not finite.
+    FemInputError : unknown names, a point outside all bodies or on several, numbers that are not finite.
     """
     nodal = _nodal(load, assembly)
     if not np.isfinite(nodal).all():
@@ -107,7 +111,7 @@ def _nodal(load: Load, assembly: Assembly) -> FloatArray:
     if isinstance(load, Gravity):
         return _gravity(load, assembly)
     if isinstance(load, PointForce):
-        found = cell_of_point(assembly.bodies, assembly.offsets, load.point, where=where)
+        found = cell_of_point(assembly.bodies, assembly.offsets, load.point, where=where, body=load.body)
         nodal = np.zeros((len(assembly.points), 3))
         nodal[found.nodes] = np.outer(found.shape, finite_vector(load.force, "the load", where=where))
         return nodal

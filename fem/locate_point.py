@@ -26,27 +26,36 @@ class CellPoint:
     shape: FloatArray
 
 
-def cell_of_point(bodies: Sequence[Body], offsets: IntArray, point: Sequence[float], *, where: str) -> CellPoint:
-    """The cell of any body that contains a point of the undeformed structure (m).
+def cell_of_point(
+    bodies: Sequence[Body], offsets: IntArray, point: Sequence[float], *, where: str, body: str | None = None
+) -> CellPoint:
+    """The cell of any body, or of the one named, that contains a point of the undeformed structure (m).
 
-    A point outside all bodies raises ``FemInputError`` with the nearest node; ``where`` says who asks.
+    ``where`` says who asks. ``FemInputError`` where the point lies outside (with the nearest node), where no body is
+    named and several contain it, since bodies that touch move apart, and where the named body does not exist.
     """
     place = finite_vector(point, "the point", where=where)
-    found = [_closest(body, place) for body in bodies]
-    outside, nodes, shape = min(
-        ((miss, n + offset, s) for (miss, n, s), offset in zip(found, offsets, strict=True)),
-        key=lambda item: item[0],
-    )
-    if not outside <= _OUTSIDE:
-        points = np.vstack([body.mesh.points for body in bodies])
+    names = [part.name for part in bodies]
+    if body is not None and body not in names:
+        advice = f"bodies are {', '.join(names)}"
+        raise FemInputError("unknown body", where=where, value=body, advice=advice)
+    asked = [number for number, name in enumerate(names) if body in (None, name)]
+    found = {number: _closest(bodies[number], place) for number in asked}
+    on = [number for number in asked if found[number][0] <= _OUTSIDE]
+    if len(on) > 1:
+        advice = f"name one: body = {' or '.join(repr(names[number]) for number in on)}"
+        raise FemInputError("the point lies on several bodies", where=where, value=tuple(point), advice=advice)
+    if not on:
+        points = np.vstack([bodies[number].mesh.points for number in asked])
         nearest = points[np.linalg.norm(points - place, axis=1).argmin()]
         raise FemInputError(
-            "the point lies outside all bodies",
+            f"the point lies outside {'all bodies' if body is None else body}",
             where=where,
             value=tuple(point),
             advice=f"the nearest node is at {tuple(float(x) for x in nearest.round(6))}",
         )
-    return CellPoint(nodes, shape)
+    _, nodes, shape = found[on[0]]
+    return CellPoint(nodes + int(offsets[on[0]]), shape)
 
 
 def _closest(body: Body, point: FloatArray) -> tuple[float, IntArray, FloatArray]:

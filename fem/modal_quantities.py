@@ -8,6 +8,8 @@ from math import gcd
 import numpy as np
 
 from fem.arrays import ComplexArray, FloatArray
+from fem.errors import FemInputError
+from fem.finite_values import check_rows, finite_array
 from fem.model import Model
 from fem.modes import ModalBasis, Rayleigh, damping_ratios
 
@@ -28,8 +30,14 @@ def mac(a: FloatArray, b: FloatArray) -> FloatArray:
 
     a (n_row, n_a) and b (n_row, n_b) may be full shapes or their values at sensors.
 
+    Sets with other numbers of rows raise ``FemInputError``.
+
     Source: Allemang & Brown, Proc. 1st IMAC (1982) 110-116.
     """
+    shapes = (np.shape(a), np.shape(b))
+    if len(shapes[0]) != 2 or len(shapes[1]) != 2 or shapes[0][0] != shapes[1][0]:
+        advice = "give (n_row, n_a) and (n_row, n_b)"
+        raise FemInputError("the sets of shapes do not fit together", where="mac", value=shapes, advice=advice)
     cross = a.T @ b
     return np.asarray(cross**2 / np.outer(np.einsum("na,na->a", a, a), np.einsum("nb,nb->b", b, b)))
 
@@ -93,8 +101,16 @@ def frequency_response(
     Parameters
     ----------
     load : (n_dof,) N, such as ``TimeLoad.pattern``; sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
+    frequency_hz : (n_frequency,).
+
+    Other shapes and numbers that are not finite raise ``FemInputError``.
     """
-    Omega = 2.0 * np.pi * np.asarray(frequency_hz, dtype=float)[:, None]
+    where, n_dof = "frequency response", len(modes.shapes)
+    force = finite_array(load, (n_dof,), "the load", where=where, advice=f"give {n_dof} nodal forces")
+    rows = check_rows(sensors, n_dof, where=where)
+    advice = "give a list of frequencies"
+    given = finite_array(frequency_hz, (-1,), "the list of frequencies", where=where, advice=advice)
+    Omega = 2.0 * np.pi * given[:, None]
     zeta = damping_ratios(modes, damping)
-    modal = (modes.shapes.T @ load) / (modes.omega**2 - Omega**2 + 2.0j * zeta * modes.omega * Omega)
-    return np.asarray(modal @ (sensors @ modes.shapes).T)
+    modal = (modes.shapes.T @ force) / (modes.omega**2 - Omega**2 + 2.0j * zeta * modes.omega * Omega)
+    return np.asarray(modal @ (rows @ modes.shapes).T)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from fem.arrays import FloatArray
+from fem.arrays import BoolArray, FloatArray
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import make_solver
@@ -175,9 +175,12 @@ class LoadStep:
         model, moved = self.model, self.target.moved
         residual = point.residual
         if closing:
-            contact = model.contact.stick_tangent(np.ones(model.contact.n_point, dtype=np.int64))
-            bilateral = model.contact.bilateral_traction(model.contact.operator @ point.u, self._slip[:, :, 0])
-            pull = model.contact.force(bilateral[:, None] - point.contact.traction)[:, 0]
+            relative = model.contact.operator @ point.u
+            drawn = self._drawn(relative) | (point.contact.status[:, 0] > 0)
+            contact = model.contact.stick_tangent(drawn.astype(np.int64))
+            bilateral = model.contact.bilateral_traction(relative, self._slip[:, :, 0])
+            change = np.where(np.repeat(drawn, 3), bilateral - point.contact.traction[:, 0], 0.0)
+            pull = model.contact.force(change[:, None])[:, 0]
             residual = np.where(model.free, residual - pull, 0.0)
         else:
             contact = model.contact.tangent(point.u, self._slip[:, :, 0])
@@ -195,6 +198,14 @@ class LoadStep:
         if driving:
             self._rescale(best, full @ moved)
         return best
+
+    def _drawn(self, relative: FloatArray) -> BoolArray:
+        """Points (n_point,) to draw together: the nearest of every pair, all where those leave a body loose.
+
+        Curved surfaces that touch in a point would be flattened by drawing all of them together.
+        """
+        near = self.model.contact.nearest(relative)
+        return near if loose_motion(self.model, near) is None else np.ones_like(near)
 
     def _symmetric(self, point: Point, full: sp.csr_matrix) -> sp.csr_matrix:
         """The tangent without how the limit of friction follows the pressure."""

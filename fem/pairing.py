@@ -14,6 +14,15 @@ _FACE_OF_NODES = {6: "tri6", 8: "quad8", 9: "quad9"}
 _NEWTON_STEPS = 12
 _EDGE_TOLERANCE = 1e-6
 
+FACING = 0.5
+"""Surfaces face each other where their normals are within 60 degrees of opposite."""
+
+_WIDER = 1.5
+"""Growth of the box of a facet in which projections are looked for: bulges and what may miss the facet."""
+
+_CHUNK = 256
+"""Facets whose neighbours are listed at a time: a wide reach lists many before few are kept."""
+
 
 @dataclass(frozen=True)
 class SurfacePoints:
@@ -112,49 +121,119 @@ def points_on(
     return SurfacePoints(at, normal / size[:, None], size * weights, nodes, n, facet)
 
 
+@dataclass(frozen=True)
+class Facing:
+    """What the master must be to a target: normals within 60 degrees of opposite, gap not below -``depth``.
+
+    ``normals`` (n_target, 3) are unit normals of the surface that the targets lie on; ``depth`` is in m.
+    """
+
+    normals: FloatArray
+    depth: float
+
+
 def project(
-    points: FloatArray, targets: FloatArray, facets: IntArray, reach: float, *, slack: float = _EDGE_TOLERANCE
+    points: FloatArray,
+    targets: FloatArray,
+    facets: IntArray,
+    reach: float,
+    *,
+    slack: float = _EDGE_TOLERANCE,
+    facing: Facing | None = None,
 ) -> Projection:
     """Closest points of ``targets`` (n_target, 3) on facets over nodes at ``points``.
 
     Newton on (x(xi) - x_t) . dx/dxi = 0 for every facet that may come within ``reach`` (m) of a target; a projection
     counts when xi lies in the facet and its distance is at most ``reach``; where none does, one that misses the facet
-    by less than ``slack`` in reference coordinates: a target over the kink between two facets. Wriggers,
-    Computational Contact Mechanics, sec. 4.1.
+    by less than ``slack`` in reference coordinates: a target over the kink between two facets. With ``facing`` only
+    projections on what faces the targets count. Wriggers, Computational Contact Mechanics, sec. 4.1.
     """
+    found = np.zeros(len(targets), dtype=bool)
+    chosen, xi = np.zeros(len(targets), dtype=np.int64), np.zeros((len(targets), 2))
+    # Near facets first: targets that touch cost the same whatever the reach.
+    for distance in sorted({min(0.5 * mean_size(points, facets), reach), reach}):
+        left = np.flatnonzero(~found)
+        own = None if facing is None else Facing(facing.normals[left], facing.depth)
+        index, facet, local = _nearest(points, targets[left], facets, distance, (slack, own))
+        found[left[index]], chosen[left[index]], xi[left[index]] = True, facet, local
     reference = face_element(facets)
-    target, facet = _candidates(points[facets], targets, reach)
-    local = _closest(reference, points[facets[facet]], targets[target])
-    n, _ = reference.shape(local)
-    distance = np.linalg.norm(np.einsum("ta,tai->ti", n, points[facets[facet]]) - targets[target], axis=1)
-    beside = ~_inside(reference, local, _EDGE_TOLERANCE)
-    usable = np.flatnonzero((~beside | _inside(reference, local, slack)) & (distance <= reach))
-    # Nearest first; of equally near facets (a shared edge) the lower number, so that the choice is reproducible.
-    order = usable[np.lexsort((facet[usable], distance[usable], beside[usable], target[usable]))]
-    found, first = np.unique(target[order], return_index=True)
-    chosen = np.zeros(len(targets), dtype=np.int64)
-    xi = np.zeros((len(targets), 2))
-    chosen[found], xi[found] = facet[order[first]], local[order[first]]
-    is_found = np.zeros(len(targets), dtype=bool)
-    is_found[found] = True
-    n, dn = reference.shape(xi)
     corner = points[facets[chosen]]
-    tangents = np.einsum("tad,tai->dti", dn, corner)
-    normal = np.cross(tangents[0], tangents[1])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return Projection(np.einsum("ta,tai->ti", n, corner), normal, facets[chosen], n, chosen, is_found)
+    n = reference.shape(xi)[0]
+    at = np.einsum("ta,tai->ti", n, corner)
+    return Projection(at, _normals(reference, corner, xi), facets[chosen], n, chosen, found)
+
+
+def _nearest(
+    points: FloatArray, targets: FloatArray, facets: IntArray, reach: float, rule: tuple[float, Facing | None]
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Numbers of the targets that find a facet within ``reach``, the facet, and the place on it (n, 2)."""
+    reference, (slack, facing) = face_element(facets), rule
+    target, facet = _candidates(points[facets], targets, reach)
+    corner = points[facets[facet]]
+    local = _closest(reference, corner, targets[target])
+    offset = targets[target] - np.einsum("ta,tai->ti", reference.shape(local)[0], corner)
+    distance = np.linalg.norm(offset, axis=1)
+    beside = ~_inside(reference, local, _EDGE_TOLERANCE)
+    usable = (~beside | _inside(reference, local, slack)) & (distance <= reach)
+    if facing is not None:
+        normal = _normals(reference, corner, local)
+        usable &= np.einsum("ti,ti->t", normal, facing.normals[target]) < -FACING
+        usable &= np.einsum("ti,ti->t", normal, offset) >= -facing.depth
+    # Nearest first; of equally near facets (a shared edge) the lower number, so that the choice is reproducible.
+    chosen = np.flatnonzero(usable)
+    order = chosen[np.lexsort((facet[chosen], distance[chosen], beside[chosen], target[chosen]))]
+    index, first = np.unique(target[order], return_index=True)
+    return index, facet[order[first]], local[order[first]]
+
+
+def _normals(reference: ReferenceElement, corner: FloatArray, xi: FloatArray) -> FloatArray:
+    """Unit normals of facets (n, n_local, 3) at xi (n, 2)."""
+    normal = np.cross(*np.einsum("tad,tai->dti", reference.shape(xi)[1], corner))
+    return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
 def _candidates(corner: FloatArray, targets: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Target and facet numbers of all pairs that may be within ``reach``: bounding spheres of corner (n_facet, ..., 3).
+    """Target and facet numbers of all pairs that may project on each other within ``reach``.
 
-    Quadratic facets bulge out of their nodes by less than their half size, hence the sphere of twice the node radius.
+    Bounding spheres of the facets (n_facet, n_local, 3) first: quadratic facets bulge out of their nodes by less than
+    their half size, hence the sphere of twice the node radius. Of those at a distance, targets stay that lie over the
+    box of the facet, wider by what its normals spread at that height.
     """
     centre = corner.mean(axis=1)
     radius = 2.0 * np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
-    near = cKDTree(targets).query_ball_point(centre, radius + reach)
-    facet = np.repeat(np.arange(len(corner)), [len(found) for found in near])
-    return np.concatenate([np.empty(0), *near]).astype(np.int64), facet.astype(np.int64)
+    axes, spread = _axes(corner)
+    extent = np.abs(np.einsum("fad,fid->fai", corner - centre[:, None], axes)).max(axis=1)
+    tree = cKDTree(targets)
+    parts = [(np.empty(0, dtype=np.int64),) * 2]
+    for start in range(0, len(corner), _CHUNK):
+        some = slice(start, start + _CHUNK)
+        near = tree.query_ball_point(centre[some], radius[some] + reach)
+        f = np.repeat(np.arange(start, start + len(near)), [len(found) for found in near])
+        t = np.concatenate([np.empty(0), *near]).astype(np.int64)
+        place = np.abs(np.einsum("pd,pid->pi", targets[t] - centre[f], axes[f]))
+        aside = (_WIDER * extent[f, :2] + (spread[f] * place[:, 2])[:, None] >= place[:, :2]).all(axis=1)
+        parts.append((t[aside], f[aside]))
+    target, facet = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return target, facet
+
+
+def _axes(corner: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Frames of facets (n_facet, 3, 3), two rows along them and their normal, and the spread of their normals.
+
+    The spread is the tangent of the largest angle between a normal at a node and that of the frame, infinite from 60
+    degrees on.
+    """
+    reference = reference_element(_FACE_OF_NODES[corner.shape[1]])
+    along = np.einsum("ad,fai->dfi", reference.shape(reference.nodes.mean(axis=0)[None])[1][0], corner)
+    normal = np.cross(*along)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    first = along[0] / np.linalg.norm(along[0], axis=1)[:, None]
+    count = len(corner)
+    nodes = np.tile(reference.nodes, (count, 1))
+    own = _normals(reference, np.repeat(corner, len(reference.nodes), axis=0), nodes)
+    cosine = np.einsum("fai,fi->fa", own.reshape(count, -1, 3), normal).min(axis=1)
+    spread = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / np.maximum(cosine, FACING)
+    return np.stack([first, np.cross(normal, first), normal], axis=1), np.where(cosine > FACING, spread, np.inf)
 
 
 def _closest(reference: ReferenceElement, corner: FloatArray, targets: FloatArray) -> FloatArray:

@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.arrays import FloatArray
-from fem.bounds import require
+from fem.bounds import require, require_count
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.finite_values import as_numbers, finite_array
+from fem.friction_work import friction_work
 from fem.model import Model
 from fem.newton import LoadStep, Target, Tolerance, internal_force
+from fem.reach import warn_of_reach
 from fem.rigid_motion import check_restraint, loose_bodies, loose_motion
 from fem.sliding import sliding_motion, warn_of_sliding
 
@@ -32,7 +34,8 @@ class StaticState:
     u : (n_dof,) m.
     contact : tractions, slip and status of all points, one case.
     load_factors : converged load factors; residuals : relative residual of every iteration of every step.
-    dissipated : (n_point,) work of friction on the way, J/m^2; None where it was not kept.
+    dissipated : (n_point,) work of friction on the way, J/m^2, second order in the load steps (``friction_work``); None
+        where it was not kept.
     """
 
     u: FloatArray
@@ -70,9 +73,9 @@ class StaticSettings:
     cuts: int = 6
 
     def __post_init__(self) -> None:
-        require("static settings", "steps", self.steps, 1)
-        require("static settings", "max_iterations", self.max_iterations, 1)
-        require("static settings", "cuts", self.cuts, 0)
+        require_count("static settings", "steps", self.steps, 1)
+        require_count("static settings", "max_iterations", self.max_iterations, 1)
+        require_count("static settings", "cuts", self.cuts, 0)
         require("static settings", "tolerance", self.tolerance, 0.0, above=True)
 
 
@@ -98,6 +101,8 @@ def solve_static(
     ------
     FemConvergenceError : with the residual history; what converged before is in ``last_good`` of the error.
     FemInputError : a body that nothing holds, an interface that never closes, or a load that is not finite.
+
+    Issues ``SlidingWarning`` and ``ReachWarning``.
     """
     return _Loading(model, load, settings, start, tightened=False).run(progress)[0]
 
@@ -190,6 +195,7 @@ class _Loading:
         contact = self._model.contact
         motion = sliding_motion(contact, contact.relative(self._u[:, None]), self._contact.status)
         warn_of_sliding(contact, motion)
+        warn_of_reach(contact.names, contact.left_out, contact.left_out.depth(self._u[:, None]))
         return self._state(), self._shortening
 
     def _advance(self, old: float, new: float) -> None:
@@ -203,7 +209,8 @@ class _Loading:
         )
         slip = self._contact.slip
         found = LoadStep(model, target, slip, self._tolerance).solve(self._u, self._shortening)
-        self._dissipated += model.contact.dissipation_density(found.contact.traction, slip, found.contact.slip)[:, 0]
+        relative = (model.contact.relative(self._u[:, None]), model.contact.relative(found.u[:, None]))
+        self._dissipated += friction_work(model.contact, relative, (self._contact, found.contact))
         self._u, self._shortening, self._contact = found.u, found.shortening, found.contact
 
     def _state(self) -> StaticState:

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fem.arrays import FloatArray, IntArray
+from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.element import ReferenceElement
-from fem.pairing import SurfacePoints, face_element, n_corner, points_on, surface_points
+from fem.pairing import SurfacePoints, face_element, mean_size, n_corner, points_on, surface_points
 from fem.polygons import MAX_CORNERS, areas, clip, integration_points, straighten
 
 _WHOLE = 1e-3
@@ -22,6 +22,10 @@ _WHOLE = 1e-3
 its edge and changes integrals by the square of that."""
 
 _SLIVER = 1e-9
+
+_TWICE = 0.05
+"""Share by which pieces may cover a facet twice before some lie behind others; chords of curved edges overlap less."""
+
 _MARGIN = 0.3
 _FACING = 0.3
 _NEWTON_STEPS = 12
@@ -31,15 +35,18 @@ def segment_points(points: FloatArray, slave: IntArray, master: IntArray, reach:
     """Integration points of the slave facets (n_facet, n_local), one rule per piece that one master facet covers.
 
     A facet inside a single master facet (matching meshes) keeps its own rule. What no master facet covers within
-    ``reach`` (m) has no points. Edges of the master are followed by their chords in the reference coordinates of the
-    slave: exact where the slave facets are parallelograms or flat triangles and the edges straight.
+    ``reach`` (m) has no points; of master facets that lie behind each other the nearest counts. Edges of the master are
+    followed by their chords in the reference coordinates of the slave: exact where the slave facets are parallelograms
+    or flat triangles and the edges straight.
     """
-    pairs = _candidates(points, slave, master, reach)
+    pairs, away = _candidates(points, slave, master, reach)
     corners, counts = _pieces(points, slave, master, pairs)
     share = areas(corners, counts) / (0.5 if slave.shape[1] == 6 else 1.0)
     facet = pairs[0]
     whole = np.unique(facet[share > 1.0 - _WHOLE])
     cut = np.flatnonzero((share > _SLIVER) & ~np.isin(facet, whole))
+    size = 0.5 * mean_size(points, slave)
+    cut = cut[_first_layer(facet[cut], (corners[cut], counts[cut]), share[cut], away[cut], size)]
     plain = surface_points(points, slave[whole])
     plain = replace(plain, facet=whole[plain.facet])
     if len(cut) == 0:
@@ -52,15 +59,55 @@ def segment_points(points: FloatArray, slave: IntArray, master: IntArray, reach:
     return both.taken(np.argsort(both.facet, kind="stable"))
 
 
-def _candidates(points: FloatArray, slave: IntArray, master: IntArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Slave and master facet numbers whose bounding spheres come within ``reach`` and whose normals face each other."""
+def _candidates(
+    points: FloatArray, slave: IntArray, master: IntArray, reach: float
+) -> tuple[tuple[IntArray, IntArray], FloatArray]:
+    """Slave and master facet numbers that face each other, and their distances along the slave normal, m.
+
+    The bounding sphere of the master comes within ``reach`` (m) of that of the slave, before or behind it, and overlaps
+    the window of the slave in its plane.
+    """
     centres, radii, normals = zip(*(_spheres(points, facets) for facets in (slave, master)), strict=True)
-    near = cKDTree(centres[1]).query_ball_point(centres[0], radii[0] + radii[1].max() + reach)
+    near = cKDTree(centres[1]).query_ball_point(centres[0], radii[0] + radii[1].max() + reach, return_sorted=True)
     s = np.repeat(np.arange(len(slave)), [len(found) for found in near])
     m = np.concatenate([np.empty(0), *near]).astype(np.int64)
-    close = np.linalg.norm(centres[0][s] - centres[1][m], axis=1) <= radii[0][s] + radii[1][m] + reach
+    offset = centres[1][m] - centres[0][s]
+    away = np.einsum("pi,pi->p", offset, normals[0][s])
+    beside = np.sqrt(np.maximum(np.einsum("pi,pi->p", offset, offset) - away**2, 0.0))
+    both = radii[0][s] + radii[1][m]
+    close = (np.abs(away) <= both + reach) & (beside <= both + 2.0 * _MARGIN * radii[0][s])
     facing = np.einsum("pi,pi->p", normals[0][s], normals[1][m]) < -_FACING
-    return s[close & facing], m[close & facing]
+    keep = close & facing
+    return (s[keep], m[keep]), away[keep]
+
+
+def _first_layer(
+    facet: IntArray, pieces: tuple[FloatArray, IntArray], share: FloatArray, away: FloatArray, size: float
+) -> BoolArray:
+    """False for pieces that lie behind nearer ones of their slave facet.
+
+    Slave facet, polygon, share of the facet and distance (m) of every piece, each (n_piece, ...). Facets are looked at
+    where pieces cover more than all of them, or differ by ``size`` m in their distance; what lies so far behind the
+    slave comes last.
+    """
+    keep = np.ones(len(facet), dtype=bool)
+    if not len(facet):
+        return keep
+    depth = np.where(away < -size, np.inf, np.abs(away))
+    low, high = np.full(facet.max() + 1, np.inf), np.full(facet.max() + 1, -np.inf)
+    np.minimum.at(low, facet, away)
+    np.maximum.at(high, facet, away)
+    spread = np.where(low <= high, high, 0.0) - np.where(low <= high, low, 0.0)
+    for number in np.flatnonzero((np.bincount(facet, share) > 1.0 + _TWICE) | (spread > size)):
+        piece = np.flatnonzero(facet == number)
+        piece = piece[np.argsort(depth[piece], kind="stable")]
+        for place, own in enumerate(piece):
+            nearer = piece[:place][keep[piece[:place]]]
+            polygons, counts = pieces[0][nearer].copy(), pieces[1][nearer].copy()
+            clip(polygons, counts, np.ascontiguousarray(pieces[0][own, : pieces[1][own]]))
+            covered = np.abs(areas(polygons, counts)).sum()
+            keep[own] = covered <= _TWICE * np.abs(areas(pieces[0][own : own + 1], pieces[1][own : own + 1])[0])
+    return keep
 
 
 def _spheres(points: FloatArray, facets: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -23,6 +23,9 @@ from fem.pairing import surface_points
 RIGID = 1000.0
 """Default bed in multiples of E / h: it gives way like a thousandth of a facet size of material."""
 
+_SAME = 1e-9
+"""Largest difference of shape functions at which two ends of a spring are one point: rounding."""
+
 
 @dataclass(frozen=True)
 class Foundation:
@@ -45,22 +48,26 @@ class Foundation:
 class Spring:
     """Stiffness (k_x, k_y, k_z) in N/m between a material point (m) and the ground, or a second material point ``to``.
 
-    The force is -k times the (relative) displacement along each axis, whatever the distance of the points.
+    The force is -k times the (relative) displacement along each axis, whatever the distance of the points. ``body``
+    and ``to_body`` name the bodies that they lie on, which is needed where bodies touch.
     """
 
     name: str
     point: Vector
     stiffness: Vector
     to: Vector | None = None
+    body: str | None = None
+    to_body: str | None = None
 
 
 @dataclass(frozen=True)
 class PointMass:
-    """A mass in kg that moves with a material point (m), without rotary inertia."""
+    """A mass in kg that moves with a material point (m), without rotary inertia; ``body`` where two touch there."""
 
     name: str
     point: Vector
     mass: float
+    body: str | None = None
 
 
 @dataclass(frozen=True)
@@ -143,15 +150,21 @@ def _tangents(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _spring(spring: Spring, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArray, FloatArray]:
     where = f"spring {spring.name}"
-    operator = _point_rows(spring.point, assembly, where)
+    operator = _point_rows((spring.point, spring.body), assembly, where)
     if spring.to is not None:
-        operator = operator - _point_rows(spring.to, assembly, where)
+        operator = operator - _point_rows((spring.to, spring.to_body), assembly, where)
+        if abs(operator).max() <= _SAME:
+            advice = "let its ends lie on two bodies (body, to_body) or apart"
+            raise FemInputError("both ends are the same point", where=where, value=tuple(spring.to), advice=advice)
+    elif spring.to_body is not None:
+        raise FemInputError("to_body without a point to", where=where, value=spring.to_body)
     return operator, finite_vector(spring.stiffness, "the stiffness", where=where), np.eye(3)
 
 
-def _point_rows(point: Vector, assembly: Assembly, where: str) -> sp.csr_matrix:
-    """Displacement of a material point, (3, n_dof)."""
-    found = cell_of_point(assembly.bodies, assembly.offsets, point, where=where)
+def _point_rows(place: tuple[Vector, str | None], assembly: Assembly, where: str) -> sp.csr_matrix:
+    """Displacement of a material point on a body, (3, n_dof)."""
+    point, body = place
+    found = cell_of_point(assembly.bodies, assembly.offsets, point, where=where, body=body)
     axis = np.arange(3)
     columns = 3 * found.nodes[None, :] + axis[:, None]
     rows = np.broadcast_to(axis[:, None], columns.shape)
@@ -167,7 +180,7 @@ def point_mass_matrix(masses: Sequence[PointMass], assembly: Assembly) -> sp.csr
         where = f"point mass {item.name}"
         if not finite_number(item.mass, "the mass", where=where) > 0.0:
             raise FemInputError("mass must be positive", where=where, value=item.mass)
-        rows = _point_rows(item.point, assembly, where)
+        rows = _point_rows((item.point, item.body), assembly, where)
         total = total + item.mass * (rows.T @ rows)
     return total.tocsr()
 
@@ -176,6 +189,7 @@ def lumped_point_masses(masses: Sequence[PointMass], assembly: Assembly) -> Floa
     """The masses shared out to the nodes of their cells by N^2, (n_node,) kg: none is negative, their sum is kept."""
     nodal = np.zeros(len(assembly.points))
     for item in masses:
-        found = cell_of_point(assembly.bodies, assembly.offsets, item.point, where=f"point mass {item.name}")
+        where = f"point mass {item.name}"
+        found = cell_of_point(assembly.bodies, assembly.offsets, item.point, where=where, body=item.body)
         nodal[found.nodes] += item.mass * found.shape**2 / (found.shape @ found.shape)
     return nodal

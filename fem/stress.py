@@ -68,17 +68,18 @@ def nodal_stress(model: Model, u: FloatArray) -> Stress:
     return Stress(model.points, *(np.concatenate(tensors) for tensors in zip(*parts, strict=True)))
 
 
-def point_stress(model: Model, u: FloatArray, points: Sequence[Vector]) -> Stress:
+def point_stress(model: Model, u: FloatArray, points: Sequence[Vector], *, body: str | None = None) -> Stress:
     """Nodal stress interpolated at material points (n_point, 3) m, by the shape functions of the cell around each.
 
-    A point outside all bodies raises ``FemInputError`` with the nearest node.
+    ``body`` names the one to look at where bodies touch. A point outside all bodies, or on several without it, raises
+    ``FemInputError``.
     """
     advice = "give (n_point, 3) numbers, one point as [(x, y, z)]"
     places = finite_array(points, (-1, 3), "the table of points", where="stress", advice=advice)
     nodal = nodal_stress(model, u)
     tensors = np.empty((2, len(places), 3, 3))
     for number, point in enumerate(places):
-        found = cell_of_point(model.bodies, model.offsets, point, where=f"stress at point {number}")
+        found = cell_of_point(model.bodies, model.offsets, point, where=f"stress at point {number}", body=body)
         for kind, tensor in enumerate((nodal.second_piola, nodal.cauchy)):
             tensors[kind, number] = np.einsum("a,aij->ij", found.shape, tensor[found.nodes])
     return Stress(places, tensors[0], tensors[1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,32 +13,27 @@ from fem.block import arch, graded, hex_block
 from fem.contact import ContactState
 from fem.equilibrium import interface_states
 from fem.errors import FemConvergenceError, FemError
-from fem.loads import Force as ForceOn
-from fem.loads import Load
+from fem.locate_point import cell_of_point
 from fem.material import Material
 from fem.mesh import Mesh, within
 from fem.modal_quantities import effective_masses, near_integer_ratios, total_masses
 from fem.model import (
     Body,
     Bolt,
-    Clamp,
     Foundation,
-    Gravity,
     Model,
     Pair,
-    PointForce,
     PointMass,
-    Pressure,
     Spring,
     Support,
     Tie,
-    Traction,
     build_model,
 )
 from fem.modes import ModalBasis, Rayleigh, damping_ratios, rayleigh
 from fem.modes import solve_modes as tangent_modes
 from fem.preload import StaticSettings, StaticState, lock_bolts
 from fem.preload import solve_preload as tighten
+from fem.reach import ReachWarning, TieWarning
 from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
 from fem.sliding import SlidingWarning
@@ -46,9 +41,9 @@ from fem.springs import Elastic
 from fem.stress import nodal_stress
 from romgen.arrays import IntArray
 from romgen.errors import InputError, NumericalError
-from romgen.fe_inputs import still, time_loads
+from romgen.fe_inputs import dead_load, still, time_loads
 from romgen.progress import Report
-from romgen.settings import BlockSettings, LoadSettings, MeshSettings, Study, named_surfaces, unknown
+from romgen.settings import BlockSettings, MeshSettings, Study, named_points, named_surfaces, unknown
 from romgen.structure import RATIO_TOLERANCE, FrequencyRatio, Interface, Modes, Preload, Structure
 
 log = logging.getLogger(__name__)
@@ -67,14 +62,30 @@ def translated() -> Iterator[None]:
         raise InputError(error.what, where=error.where, value=error.value, advice=error.advice) from error
 
 
+@contextmanager
+def logged() -> Iterator[None]:
+    """Hand what ``fem`` warns of to the log, and so to the report."""
+    with warnings.catch_warnings(record=True) as caught:
+        for category in (SlidingWarning, ReachWarning, TieWarning):
+            warnings.simplefilter("always", category)
+        yield
+    for warning in caught:
+        log.warning("%s", warning.message)
+
+
 @translated()
 def build(study: Study) -> Model:
-    """Mesh the bodies of a study and assemble them with their contacts, constraints and loads."""
-    bodies = []
-    for name, table in study.bodies.items():
-        values = study.materials[table.material]
-        material = Material(values.young_modulus, values.poisson_ratio, values.density)
-        bodies.append(Body(name, body_mesh(study, name), material, table.kinematics))
+    """Mesh the bodies of a study and assemble them with their contacts, constraints and loads.
+
+    What it warns of (``TieWarning``) is logged by the preload, which every other stage comes after.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TieWarning)
+        return _assembled(study)
+
+
+def _assembled(study: Study) -> Model:
+    bodies = [_body(study, name, body_mesh(study, name)) for name in study.bodies]
     pairs = [Pair(name, **contact.model_dump()) for name, contact in study.contacts.items()]
     ties = [Tie(name, **tie.model_dump()) for name, tie in study.ties.items()]
     bolts = [Bolt(name, **bolt.model_dump()) for name, bolt in study.bolts.items()]
@@ -82,7 +93,7 @@ def build(study: Study) -> Model:
     springs += [Foundation(name, **bed.model_dump()) for name, bed in study.foundations.items()]
     masses = [PointMass(name, **mass.model_dump()) for name, mass in study.point_masses.items()]
     supports = [Support(c.surface, tuple(c.directions), c.displacement or 0.0) for c in study.constraints]
-    loads = [_load(table) for table in study.loads]
+    loads = [dead_load(table) for table in study.loads]
     return build_model(
         bodies,
         pairs=pairs,
@@ -95,20 +106,10 @@ def build(study: Study) -> Model:
     )
 
 
-def _load(table: LoadSettings) -> Load:
-    surface = table.surface or ""
-    if table.total_force is not None:
-        return Clamp(table.name, surface, table.total_force)
-    if table.pressure is not None:
-        return Pressure(table.name, surface, table.pressure)
-    if table.traction is not None:
-        return Traction(table.name, surface, table.traction)
-    if table.acceleration is not None:
-        return Gravity(table.name, table.acceleration)
-    force = table.force or (0.0, 0.0, 0.0)
-    if table.point is not None:
-        return PointForce(table.name, table.point, force)
-    return ForceOn(table.name, surface, force)
+def _body(study: Study, name: str, mesh: Mesh) -> Body:
+    table = study.bodies[name]
+    values = study.materials[table.material]
+    return Body(name, mesh, Material(values.young_modulus, values.poisson_ratio, values.density), table.kinematics)
 
 
 def body_mesh(study: Study, name: str) -> Mesh:
@@ -157,7 +158,19 @@ def mesh_file_problems(study: Study) -> tuple[tuple[str, ...], int]:
             for part in wanted
             if part not in known
         ]
+    if study.meshes and not problems:
+        problems += _place_problems(study, meshes)
     return tuple(problems), sum(len(mesh.points) for name, mesh in meshes.items() if name in study.meshes)
+
+
+def _place_problems(study: Study, meshes: Mapping[str, Mesh]) -> Iterator[str]:
+    """One line per point that lies outside the bodies, or on several without saying which."""
+    bodies = [_body(study, name, meshes[name] if name in meshes else body_mesh(study, name)) for name in study.bodies]
+    for item in named_points(study):
+        try:
+            cell_of_point(bodies, np.zeros(len(bodies), dtype=np.int64), item.point, where=item.where, body=item.body)
+        except FemError as error:
+            yield str(error)
 
 
 def structure(study: Study) -> Structure:
@@ -189,14 +202,10 @@ def _triangles(facets: IntArray) -> IntArray:
 @translated()
 def solve_preload(study: Study, report: Report) -> Preload:
     """Find the static equilibrium under the loads of a study."""
-    model = build(study)
     table = study.preload
     settings = StaticSettings(table.steps, table.tolerance, table.max_iterations)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", SlidingWarning)
-        model, state = tighten(model, settings, progress=lambda f: report(f, f"load factor {f:.2f}"))
-    for warning in caught:
-        log.warning("%s", warning.message)
+    with logged():
+        model, state = tighten(_assembled(study), settings, progress=lambda f: report(f, f"load factor {f:.2f}"))
     interfaces = tuple(
         Interface(
             name=s.name,
@@ -243,7 +252,7 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
     basis = tangent_modes(model, equilibrium(model, preload), study.modes.count)
     damping = _damping(study, basis)
     loads = [load.pattern for load in time_loads(study, model, dict.fromkeys(study.load_inputs, still))]
-    sensors = [Sensor(name, table.point, table.direction) for name, table in study.sensors.items()]
+    sensors = [Sensor(name, table.point, table.direction, table.body) for name, table in study.sensors.items()]
     frequency = basis.omega / (2.0 * np.pi)
     near = near_integer_ratios(frequency, tolerance=RATIO_TOLERANCE)
     return Modes(

@@ -38,6 +38,7 @@ from romgen.settings.learning import (
 )
 from romgen.settings.load import StudyError, load_study
 from romgen.settings.mesh_files import MeshSettings, RegionSettings
+from romgen.settings.points import named_points
 from romgen.settings.study import BASE_ACCELERATION, Study, StudySettings
 
 __all__ = [
@@ -79,6 +80,7 @@ __all__ = [
     "TieSettings",
     "estimate",
     "load_study",
+    "named_points",
     "named_surfaces",
     "study_warnings",
     "surfaces",

@@ -10,8 +10,9 @@ from itertools import product
 import numpy as np
 
 from romgen.settings.data import DataSettings
-from romgen.settings.finite_elements import BlockSettings, RingDownSettings
+from romgen.settings.finite_elements import RingDownSettings
 from romgen.settings.learning import FmuSettings
+from romgen.settings.points import place_problems, unknown_bodies
 from romgen.settings.study import BASE_ACCELERATION, Study
 
 PLATFORMS = ("host", "all", "linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin")
@@ -133,30 +134,18 @@ def _contact_problems(study: Study) -> Iterator[str]:
 def _sensor_problems(study: Study) -> Iterator[str]:
     if not study.sensors:
         yield "[sensors] is empty; name at least one, such as [sensors.mid]"
-    for name, sensor in study.sensors.items():
-        if not study.meshes and not any(_inside(block, sensor.point) for block in study.blocks.values()):
-            yield f"[sensors.{name}] point lies in no block; got {list(sensor.point)} m"
+    for where, body in unknown_bodies(study):
+        yield unknown(where, "body", body, study.bodies)
+    yield from place_problems(study)
 
 
 def _excitation_problems(study: Study) -> Iterator[str]:
-    for name, table in study.excitations.items():
+    for name in study.excitations:
         where = f"[excitations.{name}]"
         if not _IDENTIFIER.fullmatch(name):
             yield f"{where} the name becomes a variable of the FMU: letters, digits and underscores; got '{name}'"
         if name in (BASE_ACCELERATION, *study.sensors):
             yield f"{where} the name is taken by another input or a sensor; choose another"
-        point = None if study.meshes else table.point
-        if point is not None and not any(_inside(block, point) for block in study.blocks.values()):
-            yield f"{where} point lies in no block; got {list(point)} m"
-
-
-def _inside(block: BlockSettings, point: tuple[float, float, float]) -> bool:
-    """Whether a point lies in the bounding box of a block, grown by its arch and 1 % of its size."""
-    rise = 0.0 if block.arch is None else block.arch.rise
-    low = np.array([block.x[0], block.y[0] + min(rise, 0.0), block.z[0]])
-    high = np.array([block.x[-1], block.y[-1] + max(rise, 0.0), block.z[-1]])
-    margin = 0.01 * (high - low)
-    return bool(np.all((low - margin <= point) & (point <= high + margin)))
 
 
 def _mode_problems(study: Study) -> Iterator[str]:

@@ -87,11 +87,15 @@ class ConstraintSettings(Settings):
 
 
 class LoadSettings(Settings):
-    """Table [[loads]]: one dead load: pressure by its resultant, force, traction, or the acceleration of gravity."""
+    """Table [[loads]]: one dead load: pressure by its resultant, force, traction, or the acceleration of gravity.
+
+    ``body`` says on which body a point lies where two touch.
+    """
 
     name: str
     surface: str | None = None
     point: tuple[Length, Length, Length] | None = None
+    body: str | None = None
     total_force: Force | None = None
     force: tuple[Force, Force, Force] | None = None
     pressure: Pressure | None = None
@@ -110,6 +114,8 @@ class LoadSettings(Settings):
         if places not in wanted:
             ways = " or ".join(" and ".join(way) or "no place" for way in wanted)
             raise ValueError(f"{given[0]} goes with {ways}; got {', '.join(places) or 'none'}")
+        if self.body is not None and self.point is None:
+            raise ValueError("body goes with a point; the name of a surface holds its body")
         return self
 
 
@@ -130,10 +136,11 @@ class ModesSettings(Settings):
 
 
 class SensorSettings(Settings):
-    """Table [sensors.<name>]: one displacement component at one material point."""
+    """Table [sensors.<name>]: one displacement component at one material point, of ``body`` where two touch."""
 
     point: tuple[Length, Length, Length]
     direction: Direction
+    body: str | None = None
 
 
 class BaseAccelerationSettings(Settings):
@@ -145,12 +152,14 @@ class BaseAccelerationSettings(Settings):
 class ExcitationSettings(Settings):
     """Table [excitations.<name>]: a force in N along ``direction`` at a point or spread over a face, edge or region.
 
-    Without a direction it is a pressure in Pa against the normals of a face.
+    Without a direction it is a pressure in Pa against the normals of a face. ``body`` says on which body a point lies
+    where two touch.
     """
 
     surface: str | None = None
     point: tuple[Length, Length, Length] | None = None
     direction: tuple[float, float, float] | None = None
+    body: str | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
@@ -160,6 +169,8 @@ class ExcitationSettings(Settings):
             raise ValueError("a force at a point needs a direction, such as [0.0, 1.0, 0.0]")
         if self.direction is not None and not any(self.direction):
             raise ValueError("direction is zero")
+        if self.body is not None and self.point is None:
+            raise ValueError("body goes with a point; the name of a surface holds its body")
         return self
 
     @property

@@ -42,11 +42,16 @@ class BoltSettings(Settings):
 
 
 class SpringSettings(Settings):
-    """Table [springs.<name>]: k_x, k_y, k_z between a point and the ground, or a second point ``to``."""
+    """Table [springs.<name>]: k_x, k_y, k_z between a point and the ground, or a second point ``to``.
+
+    ``body`` and ``to_body`` say on which bodies the points lie where two touch.
+    """
 
     point: tuple[Length, Length, Length]
     stiffness: tuple[SpringStiffness, SpringStiffness, SpringStiffness]
     to: tuple[Length, Length, Length] | None = None
+    body: str | None = None
+    to_body: str | None = None
 
 
 class FoundationSettings(Settings):
@@ -58,7 +63,8 @@ class FoundationSettings(Settings):
 
 
 class PointMassSettings(Settings):
-    """Table [point_masses.<name>]: a mass that moves with a material point, such as a sensor."""
+    """Table [point_masses.<name>]: a mass that moves with a material point, of ``body`` where two touch."""
 
     point: tuple[Length, Length, Length]
     mass: Mass
+    body: str | None = None

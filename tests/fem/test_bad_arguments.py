@@ -46,6 +46,20 @@ def _explicit(**options: object) -> fem.ExplicitTransient:
     return fem.ExplicitTransient(MODEL, REST, STILL, fem.ExplicitSettings(1e-4, solver="superlu"), **options)
 
 
+def _response(**options: object) -> object:
+    given = {"load": MODEL.load, "sensors": np.zeros((1, MODEL.n_dof)), "frequency_hz": [10.0], **options}
+    return fem.frequency_response(_modes(), STILL, given["load"], given["sensors"], given["frequency_hz"])
+
+
+def _recorded(n_step: object, sensors: object) -> object:
+    march = _explicit()
+    return fem.record_history(march, march.start(ZERO, ZERO), n_step, sensors)
+
+
+def _moved(vector: object) -> object:
+    return fem.support_motion(MODEL, "beam.x_min", ("x", "y"), lambda t: 0.0, vector=vector)
+
+
 def _modes() -> fem.ModalBasis:
     return fem.solve_modes(MODEL, REST, 3, solver="superlu")
 
@@ -125,6 +139,15 @@ def test_parts_of_a_model(make: Callable[[], object], message: str) -> None:
         (lambda: fem.solve_modes(MODEL, fem.rest_state(OTHER), 2), "belongs to another model"),
         (lambda: fem.solve_modes(MODEL, REST, 0), "modes: count out of range"),
         (lambda: fem.solve_modes(MODEL, REST, -1), "modes: count out of range"),
+        (lambda: fem.solve_modes(MODEL, REST, 2.5), "modes: count out of range; got 2.5; give a whole number"),
+        (lambda: _response(load=MODEL.load[:-1]), "frequency response: the load has the wrong shape"),
+        (lambda: _response(load=np.full(MODEL.n_dof, NAN)), "frequency response: the load is not finite"),
+        (lambda: _response(sensors=np.zeros((1, 3))), "frequency response: the table of sensors has the wrong shape"),
+        (lambda: _response(sensors=np.zeros(MODEL.n_dof)), "give rows of .* numbers, as sensor_rows does"),
+        (lambda: _response(frequency_hz=100.0), "the list of frequencies has the wrong shape; .* a list of frequenc"),
+        (lambda: _response(frequency_hz=[NAN]), "the list of frequencies is not finite"),
+        (lambda: fem.mac(np.ones((3, 1)), np.ones((4, 1))), "mac: the sets of shapes do not fit together"),
+        (lambda: fem.mac(np.ones(3), np.ones((3, 1))), "mac: the sets of shapes do not fit together"),
         (lambda: fem.solve_modes(MODEL, REST, int(MODEL.free.sum())), "modes: count out of range"),
         (lambda: fem.rayleigh(_modes(), (0, 0), (0.01, 0.01)), "two different modes are needed"),
         (lambda: fem.rayleigh(_modes(), (0, 3), (0.01, 0.01)), "no such mode; .* modes are 0 to 2"),
@@ -176,3 +199,27 @@ def test_lists_and_text_paths_are_taken(tmp_path: Path) -> None:
     assert (tmp_path / "block.inp").read_text().startswith("*NODE")
     state = _explicit().start(ZERO.tolist(), ZERO.tolist())
     np.testing.assert_array_equal(state.u, ZERO)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: _moved((1.0, 2.0, 3.0)), "motion of beam.x_min: the vector has the wrong length; got 3; give one"),
+        (lambda: _moved(2.0), "motion of beam.x_min: the vector has the wrong shape; .* each of the 2 directions"),
+        (lambda: _moved((1.0, NAN)), "motion of beam.x_min: the vector is not finite"),
+        (lambda: list(_transient().march(_transient().start(ZERO, ZERO), 2.5)), "n_step out of range; got 2.5"),
+        (lambda: list(_explicit().march(_explicit().start(ZERO, ZERO), 2.5)), "n_step out of range; got 2.5"),
+        (lambda: _recorded(2.5, np.zeros((1, MODEL.n_dof))), "history: n_step out of range; got 2.5"),
+        (lambda: _recorded(2, np.zeros((1, 3))), "history: the table of sensors has the wrong shape"),
+    ],
+)
+def test_motions(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(fem.FemInputError, match=message):
+        make()
+
+
+def test_one_factor_and_one_for_each_direction_are_taken() -> None:
+    both, each = _moved((2.0,)), _moved((2.0, 3.0))
+    held = 3 * MODEL.bodies[0].mesh.nodes("x_min")
+    assert set(both.pattern[held]) == set(both.pattern[held + 1]) == set(each.pattern[held]) == {2.0}
+    assert set(each.pattern[held + 1]) == {3.0}

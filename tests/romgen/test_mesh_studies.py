@@ -14,6 +14,7 @@ from fem.block import graded, hex_block
 from romgen import fe_stages
 from romgen.cli.app import app
 from romgen.errors import InputError
+from romgen.fe_inputs import still, time_loads
 from romgen.report.vtu import write_vtu
 from romgen.settings import Study, load_study
 from romgen.stage import table_content
@@ -114,13 +115,20 @@ def test_key_of_the_mesh_stage_follows_the_content_of_the_file(tmp_path: Path, t
         ("meshes", "file", "study.toml", "unknown kind of mesh file"),
         ("regions", "x", [5.0, 6.0], "region root: no node lies in the region"),
         ("contacts", "slave", "strip.lo", "[contacts.pad] slave: unknown surface 'strip.lo'; did you mean"),
+        (
+            "sensors",
+            "point",
+            [0.01, 0.0, 0.01],
+            "[sensors.tip]: the point lies on several bodies; got (0.01, 0.0, 0.01)",
+        ),
+        ("sensors", "point", [0.3, 0.0, 0.01], "[sensors.tip]: the point lies outside all bodies"),
     ],
 )
 def test_check_opens_mesh_files(
     tmp_path: Path, tables: dict[str, Any], table: str, key: str, value: Any, message: str
 ) -> None:
     tables["contacts"] = {"pad": {"slave": "strip.low", "master": "base.y_max", "friction": 0.3}}
-    names = {"meshes": "strip", "regions": "root", "contacts": "pad"}
+    names = {"meshes": "strip", "regions": "root", "contacts": "pad", "sensors": "tip"}
     entry = tables[table][0] if table == "constraints" else tables[table][names[table]]
     entry[key] = value
     (tmp_path / "study.toml").write_text(toml_text(tables))
@@ -128,6 +136,47 @@ def test_check_opens_mesh_files(
     assert result.exit_code == 2
     assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_named_body_takes_the_point(tmp_path: Path, tables: dict[str, Any]) -> None:
+    """Sensor, force, excitation, spring and mass at a point that strip and base share act on the one that is named."""
+    point = [0.01, 0.0, 0.01]
+    tables["sensors"]["tip"] |= {"point": point, "body": "strip"}
+    tables["loads"] = [{"name": "f", "point": point, "body": "base", "force": [0.0, 1.0, 0.0]}]
+    tables["excitations"] = {"shaker": {"point": point, "body": "strip", "direction": [0.0, 1.0, 0.0]}}
+    tables["springs"] = {"s": {"point": point, "body": "strip", "to": point, "to_body": "base", "stiffness": [1, 1, 1]}}
+    tables["point_masses"] = {"m": {"point": point, "body": "base", "mass": 1.0}}
+    study = _study(tmp_path, tables)
+    model = fe_stages.build(study)
+    names = [body.name for body in model.bodies]
+    ends = [*model.offsets[1:], len(model.points)]
+    parts = {n: slice(3 * int(a), 3 * int(b)) for n, a, b in zip(names, model.offsets, ends, strict=True)}
+    assert model.load[parts["base"]].sum() == pytest.approx(1.0, abs=1e-12)
+    (shaker,) = time_loads(study, model, {"shaker": still})
+    assert shaker.pattern[parts["strip"]].sum() == pytest.approx(1.0, abs=1e-12)
+    assert model.springs.operator[:, parts["strip"]].sum() == pytest.approx(3.0, abs=1e-12)
+    assert model.springs.operator[:, parts["base"]].sum() == pytest.approx(-3.0, abs=1e-12)
+    sensors = [fe_stages.Sensor(name, s.point, s.direction, s.body) for name, s in study.sensors.items()]
+    assert fe_stages.sensor_rows(model, sensors)[0, parts["strip"]].sum() == pytest.approx(1.0, abs=1e-12)
+    result = CliRunner().invoke(app, ["check", str(tmp_path / "study.toml")])
+    assert result.exit_code == 0
+
+
+def test_ties_that_bond_little_are_logged_once(
+    tmp_path: Path, tables: dict[str, Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    """The strip of 100 mm hangs over its base of 20 mm, which it covers: no word. Moved half off the base: one line."""
+    tables["ties"] = {"pad": {"slave": "strip.low", "master": "base.y_max"}}
+    fe_stages.solve_preload(_study(tmp_path, tables), lambda share, text: None)
+    assert "bonded" not in caplog.text
+    tables["blocks"]["base"]["x"] = [-0.01, 0.01]
+    study = _study(tmp_path, tables)
+    fe_stages.build(study)
+    assert "bonded" not in caplog.text
+    fe_stages.solve_preload(study, lambda share, text: None)
+    lines = [line for line in caplog.messages if "bonded" in line]
+    assert len(lines) == 1
+    assert lines[0].startswith("tie pad: only 10 % of the slave strip.low (50 % of the area of base.y_max)")
 
 
 def test_check_counts_the_nodes_of_files(tmp_path: Path, tables: dict[str, Any]) -> None:

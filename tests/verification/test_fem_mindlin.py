@@ -70,7 +70,7 @@ def _bench(*, spheres: bool, cells: int, size: float, coarse: int) -> Bench:
     faces = ("z_min",) if spheres else ("z_min", "z_max")
     supports = [Support(f"{name}.{face}", ("z",)) for name in ("upper", "lower") for face in faces]
     supports += [Support("lower.y_min", ("x", "y")), Support("upper.y_max", ("x", "y"))]
-    pair = Pair("contact", "upper.y_min", "lower.y_max", MU, penalty, penalty, reach=5e-6)
+    pair = Pair("contact", "upper.y_min", "lower.y_max", MU, penalty, penalty)
     return Bench(build_model(bodies, pairs=[pair], supports=supports), spheres)
 
 

@@ -20,6 +20,7 @@ from fem.model import Model, Pair, build_model
 from fem.modes import Rayleigh, no_modes, rest_state, solve_modes
 from fem.motion import StepRecord
 from fem.preload import StaticSettings, solve_static
+from fem.reach import joined_left_out
 from fem.supports import Support
 from fem.transient import Transient, TransientSettings
 
@@ -32,9 +33,8 @@ def _one_sided_spring() -> Model:
     operator = sp.csr_matrix(np.eye(3))
     law = np.array([[3.0, 1.0, 0.0]])
     one, zero = np.ones(1), np.zeros((1, 3))
-    contact = Contact(
-        operator, one, 0.0 * one, law, zero, ("stop",), np.zeros(1, dtype=np.int64), one, one, np.eye(3)[None]
-    )
+    number, both, nothing = np.zeros(1, dtype=np.int64), np.ones((1, 2)), joined_left_out((), 3)
+    contact = Contact(operator, one, 0.0 * one, law, zero, ("stop",), number, one, one, np.eye(3)[None], both, nothing)
     free, none = np.array([True, False, False]), np.zeros(3)
     side = graded([0.0, 1.0], [1])
     cube = build_model([Body("cube", hex_block(side, side, side), Material(1.0, 0.0, 1.0), "linear")])

@@ -113,6 +113,27 @@ MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_set("regions", to={"pad": {"body": "bar", "x": [1, 0]}}), "ranges must go from the smaller to the larger"),
     (_set("sensors", "tip", "point", to=[1.0, 5.0, 0.1]), "[sensors.tip] point lies in no block"),
     (_set("sensors", to={}), "[sensors] is empty"),
+    (
+        _set("sensors", "tip", "point", to=[1.0, 0.0, 0.1]),
+        '[sensors.tip] point lies on bar and base, which move apart; add body = "bar" or another; got [1.0, 0.0, 0.1]',
+    ),
+    (_set("sensors", "tip", "body", to="bra"), "[sensors.tip] body: unknown body 'bra'; did you mean 'bar'?"),
+    (_set("sensors", "tip", "body", to="base"), "[sensors.tip] point lies in no part of block base"),
+    (_set("loads", 0, "body", to="bar"), "body goes with a point; the name of a surface holds its body"),
+    (
+        _set("loads", 0, to={"name": "f", "force": [0, 0, 1.0], "point": [0.5, 0, 0]}),
+        "[loads[0]] point lies on bar and",
+    ),
+    (_set("point_masses", to={"m": {"point": [0.5, 0.0, 0.0], "mass": 1.0}}), "[point_masses.m] point lies on bar and"),
+    (
+        _set("springs", to={"s": {"point": [0.5, 0, 0], "body": "bar", "to": [0.5, 0, 0], "stiffness": [1, 1, 1]}}),
+        "[springs.s] to: point lies on bar and base, which move apart; add to_body",
+    ),
+    (
+        _set("excitations", to={"f": {"point": [0.5, 0, 0], "direction": [0, 1, 0]}}),
+        "[excitations.f] point lies on bar",
+    ),
+    (_set("excitations", to={"p": {"surface": "bar.y_max", "body": "bar"}}), "body goes with a point; the name of"),
     (_set("modes", to={"count": 1}), "[learn] master_modes are numbered from 1 to count = 1"),
     (_set("ringdowns", "validation", 0, "amplitudes", to=[2e-3, 0.0]), "'b' is a multiple of training 'a'"),
     (_set("ringdowns", "validation", 0, "name", to="a"), "[ringdowns] names of starts must differ"),
