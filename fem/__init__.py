@@ -34,7 +34,7 @@ from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, 
 from fem.reach import ReachWarning, TieWarning
 from fem.reaction import reaction, reaction_moment
 from fem.read_mesh import read_mesh
-from fem.sensor import Sensor, sensor_rows
+from fem.sensor import Sensor, SensorWarning, sensor_rows
 from fem.sliding import SlidingWarning
 from fem.springs import Foundation, PointMass, Spring
 from fem.stress import integration_point_stress, nodal_stress, point_stress
@@ -73,6 +73,7 @@ __all__ = [
     "Rayleigh",
     "ReachWarning",
     "Sensor",
+    "SensorWarning",
     "SlidingWarning",
     "Spring",
     "Starts",

@@ -58,6 +58,12 @@ def cell_of_point(
     return CellPoint(nodes + int(offsets[on[0]]), shape)
 
 
+def bodies_at_point(bodies: Sequence[Body], point: Sequence[float], *, where: str) -> tuple[str, ...]:
+    """Names of the bodies on which a point of the undeformed structure (m) lies."""
+    place = finite_vector(point, "the point", where=where)
+    return tuple(body.name for body in bodies if _closest(body, place)[0] <= _OUTSIDE)
+
+
 def _closest(body: Body, point: FloatArray) -> tuple[float, IntArray, FloatArray]:
     """How far outside the closest cell the point lies (reference units), that cell's nodes and shape functions."""
     reference = reference_element(body.mesh.element)

@@ -13,7 +13,7 @@ from fem.block import arch, graded, hex_block
 from fem.contact import ContactState
 from fem.equilibrium import interface_states
 from fem.errors import FemConvergenceError, FemError
-from fem.locate_point import cell_of_point
+from fem.locate_point import bodies_at_point, cell_of_point
 from fem.material import Material
 from fem.mesh import Mesh, within
 from fem.modal_quantities import effective_masses, near_integer_ratios, total_masses
@@ -35,7 +35,7 @@ from fem.preload import StaticSettings, StaticState, lock_bolts
 from fem.preload import solve_preload as tighten
 from fem.reach import ReachWarning, TieWarning
 from fem.read_mesh import read_mesh
-from fem.sensor import Sensor, sensor_rows
+from fem.sensor import Sensor, SensorWarning, sensor_rows
 from fem.sliding import SlidingWarning
 from fem.springs import Elastic
 from fem.stress import nodal_stress
@@ -66,7 +66,7 @@ def translated() -> Iterator[None]:
 def logged() -> Iterator[None]:
     """Hand what ``fem`` warns of to the log, and so to the report."""
     with warnings.catch_warnings(record=True) as caught:
-        for category in (SlidingWarning, ReachWarning, TieWarning):
+        for category in (SensorWarning, SlidingWarning, ReachWarning, TieWarning):
             warnings.simplefilter("always", category)
         yield
     for warning in caught:
@@ -168,7 +168,9 @@ def _place_problems(study: Study, meshes: Mapping[str, Mesh]) -> Iterator[str]:
     bodies = [_body(study, name, meshes[name] if name in meshes else body_mesh(study, name)) for name in study.bodies]
     for item in named_points(study):
         try:
-            cell_of_point(bodies, np.zeros(len(bodies), dtype=np.int64), item.point, where=item.where, body=item.body)
+            on = bodies_at_point(bodies, item.point, where=item.where) if item.is_sensor and item.body is None else ()
+            body = on[0] if on else item.body
+            cell_of_point(bodies, np.zeros(len(bodies), dtype=np.int64), item.point, where=item.where, body=body)
         except FemError as error:
             yield str(error)
 
@@ -253,6 +255,8 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
     damping = _damping(study, basis)
     loads = [load.pattern for load in time_loads(study, model, dict.fromkeys(study.load_inputs, still))]
     sensors = [Sensor(name, table.point, table.direction, table.body) for name, table in study.sensors.items()]
+    with logged():
+        rows = sensor_rows(model, sensors)
     frequency = basis.omega / (2.0 * np.pi)
     near = near_integer_ratios(frequency, tolerance=RATIO_TOLERANCE)
     return Modes(
@@ -264,7 +268,7 @@ def solve_modes(study: Study, preload: Preload) -> Modes:
         inputs=tuple(study.load_inputs),
         input_units=tuple(study.load_inputs.values()),
         sensors=tuple(study.sensors),
-        sensor_matrix=sensor_rows(model, sensors),
+        sensor_matrix=rows,
         alpha=damping.alpha,
         beta=damping.beta,
         effective_mass=effective_masses(model, basis)[:, :3],

@@ -134,7 +134,7 @@ def _mean_rates(
 def _steps(
     eigenvalues: ComplexArray, normal_form: PolynomialMap[np.complex128], trained: TrainedRange, z: ComplexArray
 ) -> FloatArray:
-    """Internal steps (n,) in s at the states z (n, m), by the rates of the nonlinear terms there and their detunings."""
+    """Internal steps (n,) in s at states z (n, m), by the rates of the nonlinear terms there and their detunings."""
     m, omega = len(eigenvalues), eigenvalues.imag
     rho = np.tile(trained.amplitude, 2)
     slopes = jacobian(normal_form, zeta(z)) * rho / rho[:m, None]

@@ -12,7 +12,7 @@ import numpy as np
 from romgen.settings.data import DataSettings
 from romgen.settings.finite_elements import RingDownSettings
 from romgen.settings.learning import FmuSettings
-from romgen.settings.points import place_problems, unknown_bodies
+from romgen.settings.points import place_problems, place_warnings, unknown_bodies
 from romgen.settings.study import BASE_ACCELERATION, Study
 
 PLATFORMS = ("host", "all", "linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin")
@@ -34,8 +34,8 @@ def study_problems(study: Study) -> tuple[str, ...]:
 
 
 def study_warnings(study: Study) -> tuple[str, ...]:
-    """Return one line per value that is legal but looks like another unit system than SI."""
-    lines = []
+    """Return one line per value that is legal but may not be what was meant: units, sensors where bodies touch."""
+    lines = list(place_warnings(study))
     for name, material in study.materials.items():
         for key, value, (low, high), unit in (
             ("density", material.density, DENSITY_RANGE, "kg/m^3"),

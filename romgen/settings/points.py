@@ -19,18 +19,22 @@ _NEAR = 0.01
 
 @dataclass(frozen=True)
 class NamedPoint:
-    """Where a study names a point (m), the key of the body it is on, and the body that it gives, if any."""
+    """Where a study names a point (m), the key of the body it is on, and the body that it gives, if any.
+
+    A sensor where bodies touch measures the first of them and says so; what acts there must name its body.
+    """
 
     where: str
     key: str
     point: tuple[float, float, float]
     body: str | None
+    is_sensor: bool = False
 
 
 def named_points(study: Study) -> tuple[NamedPoint, ...]:
     """Return all points of sensors, loads, excitations, springs and masses."""
     points = [
-        NamedPoint(f"[{table}.{name}]", "body", item.point, item.body)
+        NamedPoint(f"[{table}.{name}]", "body", item.point, item.body, table == "sensors")
         for table in ("sensors", "excitations", "springs", "point_masses")
         for name, item in getattr(study, table).items()
         if item.point is not None
@@ -57,12 +61,28 @@ def place_problems(study: Study) -> Iterator[str]:
         if not study.meshes and known and not any(_inside(block, item.point, _NEAR) for block in known.values()):
             place = "no block" if item.body is None else f"no part of block {item.body}"
             yield f"{item.where} point lies in {place}; got {list(item.point)} m"
-        touching = [name for name, block in known.items() if _inside(block, item.point, _ON_FACE)]
-        if item.body is None and len(touching) > 1:
+        touching = _touching(study, item)
+        if len(touching) > 1 and not item.is_sensor:
             yield (
                 f"{item.where} point lies on {' and '.join(touching)}, which move apart; add {item.key} = "
                 f'"{touching[0]}" or another; got {list(item.point)} m'
             )
+
+
+def place_warnings(study: Study) -> Iterator[str]:
+    """One line per sensor where blocks touch that does not say which it measures."""
+    for item in named_points(study):
+        touching = _touching(study, item)
+        if len(touching) > 1 and item.is_sensor:
+            bodies = " and ".join(touching)
+            yield f"{item.where} lies on {bodies} and measures {touching[0]}; add body if another is meant"
+
+
+def _touching(study: Study, item: NamedPoint) -> list[str]:
+    """The blocks on which a point lies that names no body."""
+    if item.body is not None:
+        return []
+    return [name for name, block in study.blocks.items() if _inside(block, item.point, _ON_FACE)]
 
 
 def _inside(block: BlockSettings, point: tuple[float, float, float], margin: float) -> bool:

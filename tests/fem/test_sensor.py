@@ -11,7 +11,7 @@ import pytest
 from fem.errors import FemInputError
 from fem.excitation import time_load
 from fem.model import Body, Model, PointForce, PointMass, Spring, build_model
-from fem.sensor import Sensor, sensor_rows
+from fem.sensor import Sensor, SensorWarning, sensor_rows
 from fem.stress import point_stress
 from tests.fem.small_models import STEEL, box, distorted, single
 
@@ -87,16 +87,23 @@ def test_a_point_where_bodies_touch_is_on_the_one_named(body: str, start: int, s
 
 
 @pytest.mark.parametrize("make", [
-    lambda model: sensor_rows(model, [Sensor("at", TOUCH, "y")]),
     lambda model: time_load(model, PointForce("at", TOUCH, (0.0, 1.0, 0.0)), lambda t: 1.0),
     lambda model: point_stress(model, np.zeros(model.n_dof), [TOUCH]),
     lambda model: build_model(model.bodies, point_masses=[PointMass("at", TOUCH, 1.0)]),
     lambda model: build_model(model.bodies, springs=[Spring("at", TOUCH, (1.0, 1.0, 1.0))]),
     lambda model: build_model(model.bodies, springs=[Spring("at", (0.5, 0.5, 0.5), (1.0, 1.0, 1.0), to=TOUCH)]),
-], ids=["sensor", "force", "stress", "mass", "spring", "second end"])  # fmt: skip
+], ids=["force", "stress", "mass", "spring", "second end"])  # fmt: skip
 def test_a_point_of_two_bodies_needs_a_name(make: Callable[[Model], object]) -> None:
     with pytest.raises(FemInputError, match=r"lies on several bodies; .*name one: body = 'lower' or 'upper'"):
         make(_touching())
+
+
+def test_a_sensor_of_two_bodies_measures_the_first_and_says_so() -> None:
+    model = _touching()
+    message = "sensor at lies on lower and upper and measures lower; name its body if another is meant"
+    with pytest.warns(SensorWarning, match=message):
+        rows = sensor_rows(model, [Sensor("at", TOUCH, "y")])
+    np.testing.assert_array_equal(rows, sensor_rows(model, [Sensor("at", TOUCH, "y", "lower")]))
 
 
 def test_unknown_and_wrong_bodies_are_named() -> None:

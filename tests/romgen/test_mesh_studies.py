@@ -116,10 +116,10 @@ def test_key_of_the_mesh_stage_follows_the_content_of_the_file(tmp_path: Path, t
         ("regions", "x", [5.0, 6.0], "region root: no node lies in the region"),
         ("contacts", "slave", "strip.lo", "[contacts.pad] slave: unknown surface 'strip.lo'; did you mean"),
         (
-            "sensors",
+            "point_masses",
             "point",
             [0.01, 0.0, 0.01],
-            "[sensors.tip]: the point lies on several bodies; got (0.01, 0.0, 0.01)",
+            "[point_masses.tip]: the point lies on several bodies; got (0.01, 0.0, 0.01)",
         ),
         ("sensors", "point", [0.3, 0.0, 0.01], "[sensors.tip]: the point lies outside all bodies"),
     ],
@@ -128,7 +128,10 @@ def test_check_opens_mesh_files(
     tmp_path: Path, tables: dict[str, Any], table: str, key: str, value: Any, message: str
 ) -> None:
     tables["contacts"] = {"pad": {"slave": "strip.low", "master": "base.y_max", "friction": 0.3}}
-    names = {"meshes": "strip", "regions": "root", "contacts": "pad", "sensors": "tip"}
+    tables["point_masses"] = {"tip": {"point": [0.01, 0.0, 0.01], "body": "strip", "mass": 1.0}}
+    if table == "point_masses":
+        del tables["point_masses"]["tip"]["body"]
+    names = {"meshes": "strip", "regions": "root", "contacts": "pad", "sensors": "tip", "point_masses": "tip"}
     entry = tables[table][0] if table == "constraints" else tables[table][names[table]]
     entry[key] = value
     (tmp_path / "study.toml").write_text(toml_text(tables))

@@ -80,5 +80,5 @@ def test_rates_are_those_of_fine_steps() -> None:
 
 
 def test_a_mode_that_does_not_decay_is_named() -> None:
-    with pytest.raises(NumericalError, match="1e-09 1/s at 9.5493 Hz"):
+    with pytest.raises(NumericalError, match=r"1e-09 1/s at 9\.5493 Hz"):
         tried_stability(np.array([-1e-9 + 60.0j, -5.0 + 121.0j]), cubic(0.0), TRAINED)

@@ -28,6 +28,15 @@ def test_steel_in_other_systems_is_noticed(tables: dict[str, Any], system: str) 
     assert all("[materials.steel]" in line and "\n" not in line for line in warnings)
 
 
+def test_a_sensor_where_blocks_touch_is_warned_about(tables: dict[str, Any]) -> None:
+    tables["sensors"]["tip"]["point"] = [1.0, 0.0, 0.1]
+    assert study_warnings(Study.model_validate(tables)) == (
+        "[sensors.tip] lies on bar and base and measures bar; add body if another is meant",
+    )
+    tables["sensors"]["tip"]["body"] = "base"
+    assert study_warnings(Study.model_validate(tables)) == ()
+
+
 def test_unit_strings_give_si_numbers(tables: dict[str, Any]) -> None:
     tables["materials"]["steel"] |= {"young_modulus": "210 GPa", "density": "7.85e-9 t/mm^3"}
     steel = Study.model_validate(tables).materials["steel"]
