@@ -165,4 +165,6 @@ class ExplicitTransient:
         state = replace(state, inertia_a=inertia_a, inertia_v=inertia_v, history=state.u[None])
         energies = self.dynamics.energies(inertia_v, state, strain, contact)
         effort = replace(Effort.none(state.u.shape[1]), substeps=substeps)
-        return StepRecord(state, contact, energies, inertia_a, effort, state)
+        load = self.dynamics.load(state.step * self.settings.time_step, state.u.shape[1])
+        held = self.dynamics.support_force(state, state.a, load)
+        return StepRecord(state, contact, energies, inertia_a, held, effort, state)

@@ -18,6 +18,7 @@ from fem.modes import Rayleigh
 from fem.motion import MotionState, Pace
 from fem.preload import StaticState
 from fem.sparse_product import SparseProduct
+from fem.support_forces import SpringForces, SupportForces
 
 
 class Dynamics:
@@ -43,6 +44,7 @@ class Dynamics:
         self.mask = model.free[:, None].astype(float)
         self.damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
         self.linear = LinearOperators(model.mass, model.stiffness)
+        self.support_force, self.spring_force = SupportForces(model), SpringForces(model, damping.beta)
         self._gap = SparseProduct(model.contact.operator)
         self._pull = SparseProduct(model.contact.operator.T.tocsr())
         rest = equilibrium.u[:, None]

@@ -9,6 +9,7 @@ import numpy as np
 
 from fem.arrays import FloatArray
 from fem.central_difference import ExplicitTransient
+from fem.errors import FemError
 from fem.motion import MotionState, StepRecord
 from fem.sliding import sliding_motion, warn_of_sliding
 from fem.transient import Transient
@@ -33,6 +34,10 @@ class History:
     kinetic, strain, contact : (n_time, n_case) J, relative to the equilibrium.
     friction, damping, external : (n_time, n_case) J, work since the first state; external that of loads and supports.
     force : (n_time, n_pair, 3, n_case) N, resultant of the tractions of every pair on its master.
+    reaction : (n_time, n_support, 3, n_case) N, resultant of every support of the model, the static part included; what
+        two supports hold counts for the first of them. It balances loads and inertia: exactly for central differences,
+        to O(h^2) for generalised-alpha.
+    spring : (n_time, n_spring, 3, n_case) N, force of every spring and foundation, its damping beta k u' included.
     closed, slipping : (n_time, n_pair, n_case) m^2, area in contact and the part of it that slips.
     state : to march on from.
     """
@@ -48,6 +53,8 @@ class History:
     damping: FloatArray
     external: FloatArray
     force: FloatArray
+    reaction: FloatArray
+    spring: FloatArray
     closed: FloatArray
     slipping: FloatArray
     state: MotionState
@@ -69,21 +76,32 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
     ----------
     sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
 
-    Issues ``SlidingWarning`` and ``EnergyWarning``. Raises as the march does; ``march_campaign`` hands on what a failed
-    march computed.
+    Issues ``SlidingWarning`` and ``EnergyWarning``. Raises as the march does; the history up to there is in
+    ``last_good`` of the error.
     """
     contact = transient.model.contact
     last = transient.observe(state)
     rows, slid = [_row(last, transient, sensors)], np.zeros(contact.n_point)
-    for record in transient.march(state, n_step):
-        rows.append(_row(record, transient, sensors))
-        slid = np.maximum(slid, sliding_motion(contact, contact.relative(record.state.u), record.contact.status))
-        last = record
+    try:
+        for record in transient.march(state, n_step):
+            rows.append(_row(record, transient, sensors))
+            slid = np.maximum(slid, sliding_motion(contact, contact.relative(record.state.u), record.contact.status))
+            last = record
+    except FemError as error:
+        error.last_good = _history(rows, state, last, transient.settings.time_step)
+        raise
+    history = _history(rows, state, last, transient.settings.time_step)
+    warn_of_sliding(contact, slid)
+    warn_of_imbalance(history)
+    return history
+
+
+def _history(rows: list[tuple[FloatArray, ...]], first: MotionState, last: StepRecord, step: float) -> History:
     columns = [np.stack(column) for column in zip(*rows, strict=True)]
-    motion, energies, done, force, areas = columns
-    done = done - state.work
-    history = History(
-        t=np.asarray((state.step + np.arange(len(rows))) * transient.settings.time_step),
+    motion, energies, done, force, reaction, spring, areas = columns
+    done = done - first.work
+    return History(
+        t=np.asarray((first.step + np.arange(len(rows))) * step),
         displacement=motion[:, 0],
         velocity=motion[:, 1],
         acceleration=motion[:, 2],
@@ -94,13 +112,12 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
         damping=done[:, 1],
         external=done[:, 2],
         force=force,
+        reaction=reaction,
+        spring=spring,
         closed=areas[:, 0],
         slipping=areas[:, 1],
         state=last.resume,
     )
-    warn_of_sliding(contact, slid)
-    warn_of_imbalance(history)
-    return history
 
 
 def warn_of_imbalance(history: History) -> None:
@@ -131,5 +148,7 @@ def _row(record: StepRecord, transient: Marching, sensors: FloatArray) -> tuple[
         record.energies - transient.rest_energies,
         state.work,
         np.einsum("pg,gij,gic->pjc", member, contact.frame, traction),
+        transient.dynamics.support_force.resultants(record),
+        transient.dynamics.spring_force.resultants(record),
         np.stack([member @ (status > 0), member @ (status == 2)]),
     )

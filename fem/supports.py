@@ -48,13 +48,10 @@ def held(
     """
     free = np.ones((n_node, 3), dtype=bool)
     prescribed = np.zeros((n_node, 3))
+    points = np.vstack([body.mesh.points for body in bodies])
     for support in supports:
-        index, region = locate(bodies, support.surface)
-        mesh = bodies[index].mesh
-        local = mesh.nodes(region)
-        axes = [_axis(bodies[index], region, support, direction) for direction in support.directions]
-        values = _values(support, mesh.points[local], axes)
-        nodes = local + offsets[index]
+        nodes, axes = components(bodies, offsets, support)
+        values = _values(support, points[nodes], axes)
         for column, axis in enumerate(axes):
             given = ~free[nodes, axis]
             if np.any(given & (prescribed[nodes, axis] != values[:, column])):
@@ -66,6 +63,13 @@ def held(
             free[nodes, axis] = False
             prescribed[nodes, axis] = values[:, column]
     return free.ravel(), prescribed.ravel()
+
+
+def components(bodies: Sequence[Body], offsets: IntArray, support: Support) -> tuple[IntArray, list[int]]:
+    """Nodes (n,) that a support holds and the axes 0, 1, 2 along which it does; raises as ``held``."""
+    index, region = locate(bodies, support.surface)
+    nodes = bodies[index].mesh.nodes(region) + offsets[index]
+    return nodes, [_axis(bodies[index], region, support, direction) for direction in support.directions]
 
 
 def _axis(body: Body, region: str, support: Support, direction: str) -> int:
