@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.arrays import FloatArray
-from fem.bounds import require
+from fem.bounds import require, require_whole
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError
 from fem.linear_solver import make_solver
@@ -40,8 +40,8 @@ class PathSettings:
     solver: str = "auto"
 
     def __post_init__(self) -> None:
-        require("path settings", "max_iterations", self.max_iterations, 1)
-        require("path settings", "max_steps", self.max_steps, 1)
+        require_whole("path settings", "max_iterations", self.max_iterations, 1)
+        require_whole("path settings", "max_steps", self.max_steps, 1)
         for name in ("step", "largest_step", "smallest_step", "tolerance"):
             require("path settings", name, getattr(self, name), 0.0, above=True)
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
+from fem.bounds import require_whole
 from fem.element import reference_element
 from fem.errors import FemInputError
 from fem.finite_values import finite_array
@@ -33,8 +34,8 @@ def graded(breakpoints: Sequence[float], cells: Sequence[int]) -> FloatArray:
             where="block",
             value=f"{len(breakpoints)} breakpoints and {len(cells)} counts",
         )
-    if min(cells) < 1:
-        raise FemInputError("cell counts must be at least 1", where="block", value=list(cells))
+    for count in cells:
+        require_whole("block", "cell count", count, 1)
     if np.any(np.diff(breakpoints) <= 0.0):
         raise FemInputError("breakpoints must increase", where="block", value=list(breakpoints))
     parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(breakpoints, breakpoints[1:], cells, strict=False)]

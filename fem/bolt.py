@@ -18,6 +18,7 @@ from fem.contact import Contact
 from fem.errors import FemInputError
 from fem.interfaces import Tie
 from fem.mesh import Mesh
+from fem.names import nearest
 from fem.supports import AXES
 
 THREAD_SIDE, HEAD_SIDE = "section_thread", "section_head"
@@ -84,7 +85,7 @@ def cut_bolts(bodies: Sequence[Body], bolts: Sequence[Bolt]) -> tuple[tuple[Body
     ties = []
     for bolt in bolts:
         if bolt.body not in by_name:
-            advice = f"bodies are {', '.join(by_name)}"
+            advice = nearest(bolt.body, by_name, "bodies are")
             raise FemInputError("unknown body", where=f"bolt {bolt.name}", value=bolt.body, advice=advice)
         body = by_name[bolt.body]
         if HEAD_SIDE in body.mesh.surfaces:

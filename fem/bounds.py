@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
+from numbers import Integral, Real
 
 from fem.errors import FemInputError
 
@@ -15,3 +15,10 @@ def require(where: str, name: str, value: object, least: float, *, above: bool =
         return
     bound = f"{'above' if above else 'at least'} {least:g}" + (f" and at most {most:g}" if most < math.inf else "")
     raise FemInputError(f"{name} out of range", where=where, value=value, advice=f"give a number {bound}")
+
+
+def require_whole(where: str, name: str, value: object, least: int, *, most: float = math.inf) -> None:
+    """Refuse a count that is no whole number, 2.0 included, or outside its bounds."""
+    if isinstance(value, Real) and not isinstance(value, Integral):
+        raise FemInputError(f"{name} must be a whole number", where=where, value=value, advice="give a number like 3")
+    require(where, name, value, least, most=most)

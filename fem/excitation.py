@@ -69,9 +69,9 @@ def support_motion(
     directions : among "x", "y", "z"; every node of the region must be held along them by a ``Support``.
     vector : factors of the displacement, one for all directions or one for each.
     """
-    index, name = locate(model.bodies, region)
-    nodes = model.bodies[index].mesh.nodes(name) + model.offsets[index]
     where = f"motion of {region}"
+    index, name = locate(model.bodies, region, where=where)
+    nodes = model.bodies[index].mesh.nodes(name, where=where) + model.offsets[index]
     unknown = [direction for direction in directions if direction not in AXES]
     if unknown:
         raise FemInputError("unknown direction", where=where, value=unknown[0], advice="choose x, y or z")

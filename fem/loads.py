@@ -12,6 +12,7 @@ from fem.body import Body, locate
 from fem.errors import FemInputError
 from fem.finite_values import finite_number, finite_vector
 from fem.locate_point import cell_of_point
+from fem.names import nearest
 from fem.pairing import surface_points
 
 Vector = tuple[float, float, float]
@@ -111,17 +112,17 @@ def _nodal(load: Load, assembly: Assembly) -> FloatArray:
         nodal = np.zeros((len(assembly.points), 3))
         nodal[found.nodes] = np.outer(found.shape, finite_vector(load.force, "the load", where=where))
         return nodal
-    share = nodal_share(assembly, load.region)
+    share = nodal_share(assembly, load.region, where=where)
     if isinstance(load, Force):
         return np.outer(share / share.sum(), finite_vector(load.total, "the load", where=where))
-    if not _extended(assembly, load.region):
+    if not _extended(assembly, load.region, where):
         advice = "use Force for single points"
         raise FemInputError("neither a surface nor a line", where=where, value=load.region, advice=advice)
     return np.outer(share, finite_vector(load.density, "the load", where=where))
 
 
 def _pressure(load: Clamp | Pressure, assembly: Assembly) -> FloatArray:
-    index, surface = locate(assembly.bodies, load.surface)
+    index, surface = locate(assembly.bodies, load.surface, where=f"load {load.name}", surface=True)
     facets = assembly.bodies[index].mesh.surface(surface) + assembly.offsets[index]
     at = surface_points(assembly.points, facets)
     given = load.pressure if isinstance(load, Pressure) else load.total_force
@@ -138,7 +139,7 @@ def _gravity(load: Gravity, assembly: Assembly) -> FloatArray:
     acceleration = finite_vector(load.acceleration, "the acceleration", where=f"load {load.name}")
     for name in load.bodies:
         if name not in names:
-            advice = f"bodies are {', '.join(names)}"
+            advice = nearest(name, names, "bodies are")
             raise FemInputError("unknown body", where=f"load {load.name}", value=name, advice=advice)
     force = (assembly.mass @ np.tile(acceleration, len(assembly.points))).reshape(-1, 3)
     for body, offset in zip(assembly.bodies, assembly.offsets, strict=True):
@@ -147,17 +148,17 @@ def _gravity(load: Gravity, assembly: Assembly) -> FloatArray:
     return np.asarray(force)
 
 
-def nodal_share(assembly: Assembly, name: str) -> FloatArray:
+def nodal_share(assembly: Assembly, name: str, *, where: str) -> FloatArray:
     """int N dA on a surface (m^2), int N ds on a line (m), or 1 at each other node: (n_node,)."""
-    index, region = locate(assembly.bodies, name)
+    index, region = locate(assembly.bodies, name, where=where)
     mesh, offset = assembly.bodies[index].mesh, assembly.offsets[index]
     share = np.zeros(len(assembly.points))
     if region in mesh.surfaces or region == "skin":
         at = surface_points(assembly.points, mesh.surface(region) + offset)
         np.add.at(share, at.nodes, at.shape * at.area[:, None])
         return share
-    nodes = mesh.nodes(region)
-    edges = _line(assembly, name)
+    nodes = mesh.nodes(region, where=where)
+    edges = _line(assembly, name, where)
     if len(edges) == 0:
         share[nodes + offset] = 1.0
         return share
@@ -170,9 +171,9 @@ def nodal_share(assembly: Assembly, name: str) -> FloatArray:
     return share
 
 
-def _line(assembly: Assembly, name: str) -> IntArray:
+def _line(assembly: Assembly, name: str, where: str) -> IntArray:
     """Edges (n_edge, 3) of cells whose nodes all belong to the set; empty if they do not cover it."""
-    index, region = locate(assembly.bodies, name)
+    index, region = locate(assembly.bodies, name, where=where)
     mesh = assembly.bodies[index].mesh
     nodes, edges = mesh.nodes(region), mesh.edges()
     edges = edges[np.isin(edges, nodes).all(axis=1)]
@@ -181,6 +182,6 @@ def _line(assembly: Assembly, name: str) -> IntArray:
     return edges if covered and 2 * len(edges) <= len(nodes) else edges[:0]
 
 
-def _extended(assembly: Assembly, name: str) -> bool:
-    index, region = locate(assembly.bodies, name)
-    return region in assembly.bodies[index].mesh.surfaces or region == "skin" or len(_line(assembly, name)) > 0
+def _extended(assembly: Assembly, name: str, where: str) -> bool:
+    index, region = locate(assembly.bodies, name, where=where)
+    return region in assembly.bodies[index].mesh.surfaces or region == "skin" or len(_line(assembly, name, where)) > 0

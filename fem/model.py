@@ -16,6 +16,7 @@ from fem.contact import Contact, join
 from fem.errors import FemInputError
 from fem.interfaces import Pair, Tie, bond_stiffness, default_penalty, pair_contact, tie_bond
 from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Pressure, Traction, load_vector
+from fem.names import unlike
 from fem.sparse_product import SparseProduct
 from fem.springs import (
     Elastic,
@@ -95,7 +96,7 @@ class Model:
 
     def facets(self, name: str) -> IntArray:
         """Global node numbers of the facets of surface "<body>.<surface>"."""
-        index, surface = locate(self.bodies, name)
+        index, surface = locate(self.bodies, name, where="facets", surface=True)
         return np.asarray(self.bodies[index].mesh.surface(surface) + self.offsets[index])
 
     def elastic_force(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -169,6 +170,7 @@ def build_model(
     Unknown names, inverted cells, interfaces without partners and numbers that are not finite raise ``FemInputError``.
     """
     _check_names(bodies)
+    unlike([*(p.name for p in pairs), *(t.name for t in ties), *(b.name for b in bolts)], "joints")
     bodies, sections = cut_bolts(bodies, bolts)
     offsets = np.concatenate([[0], np.cumsum([len(body.mesh.points) for body in bodies])[:-1]]).astype(np.int64)
     points = np.vstack([body.mesh.points for body in bodies])

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from fem.arrays import FloatArray
-from fem.bounds import require
+from fem.bounds import require, require_whole
 from fem.errors import FemConvergenceError, FemInputError
 from fem.finite_values import finite_array
 from fem.linear_solver import make_solver
@@ -70,7 +70,7 @@ def solve_modes(
     of the lowest elastic frequency, free bodies are allowed: their rigid modes come out with omega = 0 within roundoff.
     """
     state.check_belongs(model)
-    require("modes", "count", count, 1, most=int(model.free.sum()) - 1)
+    require_whole("modes", "count", count, 1, most=int(model.free.sum()) - 1)
     require("modes", "shift_hz", shift_hz, 0.0)
     if shift_hz == 0.0:
         check_restraint(model)

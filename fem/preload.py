@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.arrays import FloatArray
-from fem.bounds import require
+from fem.bounds import require, require_whole
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.finite_values import as_numbers, finite_array
@@ -70,9 +70,8 @@ class StaticSettings:
     cuts: int = 6
 
     def __post_init__(self) -> None:
-        require("static settings", "steps", self.steps, 1)
-        require("static settings", "max_iterations", self.max_iterations, 1)
-        require("static settings", "cuts", self.cuts, 0)
+        for name, least in (("steps", 1), ("max_iterations", 1), ("cuts", 0)):
+            require_whole("static settings", name, getattr(self, name), least)
         require("static settings", "tolerance", self.tolerance, 0.0, above=True)
 
 

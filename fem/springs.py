@@ -126,7 +126,7 @@ def spring_set(elastic: Sequence[Elastic], assembly: Assembly) -> SpringSet:
 
 def _bed(bed: Foundation, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArray, FloatArray]:
     where = f"spring {bed.name}"
-    index, surface = locate(assembly.bodies, bed.surface)
+    index, surface = locate(assembly.bodies, bed.surface, where=where, surface=True)
     body, offset = assembly.bodies[index], assembly.offsets[index]
     facets = body.mesh.surface(surface)
     at = surface_points(assembly.points, facets + offset)

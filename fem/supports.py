@@ -67,8 +67,9 @@ def held(
 
 def components(bodies: Sequence[Body], offsets: IntArray, support: Support) -> tuple[IntArray, list[int]]:
     """Nodes (n,) that a support holds and the axes 0, 1, 2 along which it does; raises as ``held``."""
-    index, region = locate(bodies, support.surface)
-    nodes = bodies[index].mesh.nodes(region) + offsets[index]
+    where = f"support {support.surface}"
+    index, region = locate(bodies, support.surface, where=where)
+    nodes = bodies[index].mesh.nodes(region, where=where) + offsets[index]
     return nodes, [_axis(bodies[index], region, support, direction) for direction in support.directions]
 
 
@@ -78,6 +79,8 @@ def _axis(body: Body, region: str, support: Support, direction: str) -> int:
     where = f"support {support.surface}"
     if direction != "normal":
         raise FemInputError("unknown direction", where=where, value=direction, advice="choose x, y, z or normal")
+    if region not in body.mesh.surfaces:
+        raise FemInputError("not a surface", where=where, value="normal", advice="name the axis of a line or a point")
     normals = surface_points(body.mesh.points, body.mesh.surface(region)).normals
     axis = int(np.abs(normals[0]).argmax())
     if np.any(np.abs(normals[:, axis]) < 1.0 - _ALIGNED):
