@@ -5,7 +5,7 @@ The names below are what a case needs; docs/finite_elements.md sets one up.
 
 from fem.arc_length import EquilibriumPath, PathSettings, follow_path
 from fem.block import graded, hex_block
-from fem.bolt import Bolt
+from fem.bolt import Bolt, PreloadWarning
 from fem.campaign import Observation, Starts, march_campaign, modal_coordinates, modal_starts, snap_back_starts
 from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.contact_report import PenaltyReport, penalty_reports
@@ -36,6 +36,7 @@ from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, sensor_rows
 from fem.sliding import SlidingWarning
 from fem.springs import Foundation, PointMass, Spring
+from fem.stability import unstable_directions
 from fem.stress import integration_point_stress, nodal_stress, point_stress
 from fem.supports import Support
 from fem.tightening import bolt_force
@@ -68,6 +69,7 @@ __all__ = [
     "PenaltyReport",
     "PointForce",
     "PointMass",
+    "PreloadWarning",
     "Pressure",
     "Rayleigh",
     "Sensor",
@@ -121,6 +123,7 @@ __all__ = [
     "support_motion",
     "time_load",
     "total_masses",
+    "unstable_directions",
     "within",
     "write_inp",
 ]

@@ -16,7 +16,7 @@ from fem.model import Model
 from fem.modes import rest_state
 from fem.newton import internal_force
 from fem.preload import StaticState, nodal_load
-from fem.rigid_motion import check_restraint
+from fem.rigid_motion import check_closed, check_restraint
 from fem.roundoff import is_rounding
 
 _GROW, _SHRINK = 1.5, 0.5
@@ -48,7 +48,7 @@ class PathSettings:
 
 @dataclass(frozen=True)
 class EquilibriumPath:
-    """Equilibria f_int(u) + f_contact(u) = lambda p along a path.
+    """Equilibria f_int(u) + f_contact(u) = p_0 + lambda p along a path.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ def follow_path(
     start: StaticState | None = None,
     stop: Callable[[FloatArray, float], bool] | None = None,
 ) -> EquilibriumPath:
-    """Follow the equilibria from load factor 0 through limit points, with snap-through and snap-back.
+    """Follow the equilibria f(u) = p_0 + lambda p from lambda = 0 through limit points, snap-through and snap-back.
 
     Predictor along the tangent, corrector by Newton on the plane through the prediction across the tangent, bordered
     elimination with one factor per iteration, step length by the number of iterations. Limit points are located by the
@@ -93,7 +93,7 @@ def follow_path(
     Parameters
     ----------
     load : p, (n_dof,) N; supports stay where ``start`` has them.
-    start : equilibrium at load factor 0; none: the undeformed state.
+    start : equilibrium at load factor 0; what it carries, such as a preload, stays as p_0. None: the undeformed state.
     stop : from u (n_dof,) and lambda; the path ends at the first point where it is True. None: where lambda first
         reaches 1, at exactly 1.
 
@@ -110,7 +110,8 @@ def follow_path(
     finished = stop if stop is not None else (lambda _, factor: factor >= 1.0)
     state = start if start is not None else rest_state(model)
     state.check_belongs(model)
-    path = _Path(model, load, settings)
+    check_closed(model, state.contact.status[:, 0], "path")
+    path = _Path(model, load, settings, state)
     here = path.first(state)
     points, limits, length = [here], [], settings.step
     for _ in range(settings.max_steps):
@@ -152,13 +153,14 @@ def _record(points: list[_Point], limits: list[int]) -> EquilibriumPath:
 class _Path:
     """The equations of one path and their linear algebra; ``scale`` is u_1, the length of the linear answer."""
 
-    def __init__(self, model: Model, load: FloatArray, settings: PathSettings) -> None:
+    def __init__(self, model: Model, load: FloatArray, settings: PathSettings, start: StaticState) -> None:
         self._model, self._settings = model, settings
         self._load = np.where(model.free, load, 0.0)
         self._size = float(np.linalg.norm(self._load))
         if not (np.isfinite(self._size) and self._size > 0.0):
             raise FemConvergenceError("the load has no finite, positive size", where="arc length", value=self._size)
         self._scale = 1.0
+        self._dead = internal_force(model, start.u, start.contact.slip)[0]
 
     def first(self, state: StaticState) -> _Point:
         """The start with its tangent towards a growing load; sets the length scale of the path."""
@@ -189,7 +191,7 @@ class _Path:
         last = float("inf")
         for iteration in range(self._settings.max_iterations):
             force, contact = internal_force(model, u, slip)
-            residual = np.where(model.free, factor * self._load - force, 0.0)
+            residual = np.where(model.free, self._dead + factor * self._load - force, 0.0)
             size = float(np.linalg.norm(residual))
             if not np.isfinite(size):
                 return None
@@ -212,7 +214,7 @@ class _Path:
         u, last = here.u + share * (there.u - here.u), float("inf")
         for _ in range(self._settings.max_iterations):
             force, contact = internal_force(model, u, slip)
-            residual = np.where(model.free, self._load - force, 0.0)
+            residual = np.where(model.free, self._dead + self._load - force, 0.0)
             to_residual, to_load = self._solve(u, slip, [residual, self._load])
             size = float(np.linalg.norm(residual))
             if self._is_balanced(size, last, u, slip):

@@ -7,6 +7,7 @@ cut runs along faces of cells, flat or not (pretension sections of ANSYS and Aba
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,10 @@ from fem.names import nearest
 from fem.supports import AXES
 
 THREAD_SIDE, HEAD_SIDE = "section_thread", "section_head"
+
+
+class PreloadWarning(UserWarning):
+    """Something is computed with bolts that nothing has tightened."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,14 @@ class BoltSet:
         """Shank forces at u (n_dof,) or (n_dof, n_case), tension positive, (n_bolt, ...) N."""
         own = self.stiffness * self.shortening
         return np.asarray(self.pull @ u + (own if u.ndim == 1 else own[:, None]))
+
+
+def warn_of_slack(bolts: BoltSet, who: str) -> None:
+    """Issue ``PreloadWarning`` where bolts have not been tightened; ``who`` goes on without their forces."""
+    slack = [bolt.name for bolt, delta in zip(bolts.bolts, bolts.shortening, strict=True) if delta == 0.0]
+    if slack:
+        advice = "solve_preload tightens them and returns the model to go on with"
+        warnings.warn(f"{who}: bolts {', '.join(slack)} are not tightened; {advice}", PreloadWarning, stacklevel=3)
 
 
 def cut_bolts(bodies: Sequence[Body], bolts: Sequence[Bolt]) -> tuple[tuple[Body, ...], tuple[Tie, ...]]:

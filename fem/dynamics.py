@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bolt import warn_of_slack
 from fem.contact import ContactState
 from fem.errors import FemInputError
 from fem.excitation import SupportMotion, TimeLoad
@@ -37,6 +38,7 @@ class Dynamics:
         motions: Sequence[SupportMotion] = (),
     ) -> None:
         equilibrium.check_belongs(model)
+        warn_of_slack(model.bolts, "transient")
         _check_time_functions(model, loads, TimeLoad, "time_load")
         _check_time_functions(model, motions, SupportMotion, "support_motion")
         self.model, self.equilibrium, self.loads, self.motions = model, equilibrium, tuple(loads), tuple(motions)

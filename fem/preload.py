@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bolt import warn_of_slack
 from fem.bounds import require, require_whole
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
@@ -85,7 +86,8 @@ def solve_static(
 ) -> StaticState:
     """Load-stepped Newton with line search: f_int(u) + f_contact(u, slip) = load, u = prescribed where a support holds.
 
-    Bolts keep the shortening at which they are locked, none in a new model: ``solve_preload`` tightens them.
+    Bolts keep the shortening at which they are locked, none in a new model, which a ``PreloadWarning`` says:
+    ``solve_preload`` tightens them.
 
     Parameters
     ----------
@@ -98,6 +100,7 @@ def solve_static(
     FemConvergenceError : with the residual history; what converged before is in ``last_good`` of the error.
     FemInputError : a body that nothing holds, an interface that never closes, or a load that is not finite.
     """
+    warn_of_slack(model.bolts, "static solution")
     return _Loading(model, load, settings, start, tightened=False).run(progress)[0]
 
 
