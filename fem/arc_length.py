@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,12 +23,21 @@ _GROW, _SHRINK = 1.5, 0.5
 _EASY, _HARD = 4, 7
 """A step that needed fewer iterations than _EASY lets the next one grow, more than _HARD makes it shrink."""
 
+_DRIFT, _TURN = 0.5, 0.7
+"""Largest distance of a point from its prediction over the length of the step, smallest cosine between tangents."""
+
+_SHORT = 1e-3
+"""Arc length up to which a step may turn as it likes: a kink, such as closing contact, turns any step."""
+
 
 @dataclass(frozen=True)
 class PathSettings:
     """First and largest arc length in load factor units (1 is the full load), tolerance, iterations, steps, solver.
 
-    The arc length of a step is sqrt((du/u_1)^2 + dlambda^2) with u_1 the length of the linear answer to the full load.
+    The arc length of a step is sqrt((du/u_s)^2 + dlambda^2). u_s is the length of the linear answer to the full load,
+    or of the displacement so far where that is more: a column that buckles moves a thousand times as far as it is
+    shortened, and steps counted in the shortening would creep. A step that turns by more than 45 degrees or ends far
+    from its prediction is halved, since it may have changed to another path.
     """
 
     step: float = 0.1
@@ -115,6 +124,7 @@ def follow_path(
     here = path.first(state)
     points, limits, length = [here], [], settings.step
     for _ in range(settings.max_steps):
+        here = path.measured(here)
         there, iterations, length = path.advance(here, length, points)
         if here.dfactor * there.dfactor < 0.0:
             limit = path.limit_between(here, there)
@@ -151,7 +161,7 @@ def _record(points: list[_Point], limits: list[int]) -> EquilibriumPath:
 
 
 class _Path:
-    """The equations of one path and their linear algebra; ``scale`` is u_1, the length of the linear answer."""
+    """The equations of one path and their linear algebra; ``scale`` is u_s, by which displacements are measured."""
 
     def __init__(self, model: Model, load: FloatArray, settings: PathSettings, start: StaticState) -> None:
         self._model, self._settings = model, settings
@@ -160,19 +170,26 @@ class _Path:
         if not (np.isfinite(self._size) and self._size > 0.0):
             raise FemConvergenceError("the load has no finite, positive size", where="arc length", value=self._size)
         self._scale = 1.0
+        self._start, self._linear = start.u, 1.0
         self._dead = internal_force(model, start.u, start.contact.slip)[0]
 
     def first(self, state: StaticState) -> _Point:
         """The start with its tangent towards a growing load; sets the length scale of the path."""
         answer = self._solve(state.u, state.contact.slip, [self._load])[0]
-        self._scale = float(np.linalg.norm(answer))
+        self._scale = self._linear = float(np.linalg.norm(answer))
         return _Point(state.u, 0.0, state.contact, *self._unit(answer, 1.0))
+
+    def measured(self, here: _Point) -> _Point:
+        """The point with its tangent of unit length by the u_s that holds from there on."""
+        self._scale = max(self._linear, float(np.linalg.norm(here.u - self._start)))
+        du, dfactor = self._unit(here.du, here.dfactor)
+        return replace(here, du=du, dfactor=dfactor)
 
     def advance(self, here: _Point, length: float, points: list[_Point]) -> tuple[_Point, int, float]:
         """The next point, its iterations and the step length that led there, halved until the corrector converges."""
         while length >= self._settings.smallest_step:
             found = self.step(here, length)
-            if found is not None:
+            if found is not None and (length <= _SHORT or not self._strays(here, found[0], length)):
                 return *found, length
             length *= _SHRINK
         error = FemConvergenceError(
@@ -183,6 +200,13 @@ class _Path:
         )
         error.last_good = _record(points, [])
         raise error
+
+    def _strays(self, here: _Point, there: _Point, length: float) -> bool:
+        """Whether a step may have led to another path: far from its prediction for its length, or another way."""
+        du, dfactor = there.u - here.u - length * here.du, there.factor - here.factor - length * here.dfactor
+        drift = self._dot(du, dfactor, du, dfactor)
+        turn = self._dot(here.du, here.dfactor, there.du, there.dfactor)
+        return drift > (_DRIFT * length) ** 2 or turn < _TURN
 
     def step(self, here: _Point, length: float) -> tuple[_Point, int] | None:
         """One step of given arc length; None where the corrector does not converge."""
