@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,11 +10,13 @@ import pytest
 from fem.block import graded, hex_block
 from fem.bolt import Bolt
 from fem.equilibrium import interface_states
-from fem.errors import FemInputError
+from fem.errors import FemConvergenceError, FemInputError
 from fem.loads import Force
 from fem.material import Material
 from fem.mesh import Mesh
 from fem.model import Body, Model, Pair, Support, Tie, build_model
+from fem.modes import rest_state
+from fem.newton import LoadStep, Target, Tolerance
 from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
 from fem.tightening import bolt_force
 
@@ -200,6 +202,19 @@ def _turned(direction: int) -> tuple[Model, np.ndarray]:
         supports=[Support("base.y_min", ("x", "y", "z"))],
     )
     return model, turn
+
+
+def test_contact_that_opens_on_the_way_asks_for_a_smaller_step() -> None:
+    """An iterate whose contact is partly open was taken for a bolt that nothing holds, and the solution given up."""
+    model, _ = _turned(1)
+    target = Target(model.load, 0.0 * model.load, model.bolts.wanted, touching=False)
+    contact = rest_state(model).contact
+    step = LoadStep(model, target, contact.slip, Tolerance(1e-8, F0, 30, "superlu"))
+    partly = np.where(np.arange(model.contact.n_point)[:, None] % 2 == 0, 0, 1)
+    with pytest.raises(FemConvergenceError, match="contact that a bolt presses opens on the way"):
+        step._check_tightened(np.zeros((1, 1)), replace(contact, status=partly))
+    with pytest.raises(FemInputError, match="nothing holds against tightening"):
+        step._check_tightened(np.zeros((1, 1)), replace(contact, status=np.ones_like(partly)))
 
 
 @pytest.mark.parametrize("direction", [1, -1])
