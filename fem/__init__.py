@@ -3,7 +3,7 @@
 The names below are what a case needs; docs/finite_elements.md sets one up.
 """
 
-from fem.arc_length import EquilibriumPath, PathSettings, follow_path
+from fem.arc_length import EquilibriumPath, follow_path
 from fem.block import graded, hex_block
 from fem.bolt import Bolt, PreloadWarning
 from fem.campaign import Observation, Starts, march_campaign, modal_coordinates, modal_starts, snap_back_starts
@@ -15,7 +15,7 @@ from fem.excitation import SupportMotion, TimeLoad, base_load, support_motion, t
 from fem.history import EnergyWarning, History, record_history
 from fem.inp_writer import nodal_loads, write_inp
 from fem.interfaces import Pair, Tie
-from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
+from fem.loads import Clamp, FollowerPressure, Force, Gravity, PointForce, Pressure, Traction
 from fem.material import Material
 from fem.merge import merged
 from fem.mesh import Mesh, within
@@ -30,6 +30,7 @@ from fem.modal_quantities import (
 from fem.model import Body, Model, build_model
 from fem.modes import ModalBasis, Rayleigh, no_modes, rayleigh, rest_state, solve_modes
 from fem.motion import MotionState, StepRecord
+from fem.path_settings import PathSettings
 from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
 from fem.reaction import reaction, reaction_moment
 from fem.read_mesh import read_mesh
@@ -53,6 +54,7 @@ __all__ = [
     "FemConvergenceError",
     "FemError",
     "FemInputError",
+    "FollowerPressure",
     "Force",
     "Foundation",
     "Gravity",

@@ -149,6 +149,7 @@ class ExplicitTransient:
         given = 0.5 * (dynamics.load(t - h, n_case) + load)
         friction = self.model.contact.dissipated(contact.traction, old.slip, contact.slip)
         work = [friction, *(np.einsum("nc,nc->c", p, u - old.u) for p in (damped, given))]
+        work[2] = work[2] + dynamics.follower_work(old.u, u, 0.5)
         new = replace(
             old,
             u=u,

@@ -96,6 +96,14 @@ class Dynamics:
             given += np.outer(motion.pattern, motion.at(t, u.shape[1]))
         return np.where(self.mask > 0.0, u, given)
 
+    def follower_work(self, old: FloatArray, new: FloatArray, share: float) -> FloatArray:
+        """Work (n_case,) J of the follower pressures on the way to ``new``, by ``share`` of their force there."""
+        followers = self.model.followers
+        if not followers.any:
+            return np.zeros(new.shape[1])
+        force = share * followers.force(new) + (1.0 - share) * followers.force(old)
+        return np.asarray(np.einsum("nc,nc->c", force, new - old))
+
     def support_work(
         self, old: MotionState, new: MotionState, weights: tuple[float, float], load: FloatArray
     ) -> FloatArray:

@@ -17,6 +17,9 @@ from fem.transient import Transient
 OPEN = 0.1
 """Share of the energy that went through a march which its ledger may miss without a warning."""
 
+ROUNDING = 1e-10
+"""Share of the energy stored at rest whose appearance or loss counts as rounding."""
+
 
 class EnergyWarning(UserWarning):
     """A march made or lost energy that nothing accounts for."""
@@ -92,7 +95,7 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
         raise
     history = _history(rows, state, last, transient.settings.time_step)
     warn_of_sliding(contact, slid)
-    warn_of_imbalance(history)
+    warn_of_imbalance(history, ROUNDING * float(transient.rest_energies.sum()))
     return history
 
 
@@ -120,13 +123,16 @@ def _history(rows: list[tuple[FloatArray, ...]], first: MotionState, last: StepR
     )
 
 
-def warn_of_imbalance(history: History) -> None:
-    """Issue ``EnergyWarning`` where the ledger is open by more than OPEN of the energy that went through the march."""
+def warn_of_imbalance(history: History, rounding: float = 0.0) -> None:
+    """Issue ``EnergyWarning`` where the ledger is open by more than OPEN of the energy that went through the march.
+
+    Nothing below ``rounding`` J is said: a loaded structure that stays at rest has no other energies.
+    """
     stored = history.kinetic + history.strain + history.contact
     spent = history.friction + history.damping
     through = np.abs(np.stack([history.kinetic, stored - stored.min(axis=0), spent, history.external])).max(axis=(0, 1))
     miss = np.abs(history.imbalance)
-    for case in np.flatnonzero(miss.max(axis=0) > OPEN * through):
+    for case in np.flatnonzero(miss.max(axis=0) > np.maximum(OPEN * through, rounding)):
         first = int(np.argmax(miss[:, case] > OPEN * through[case]))
         warnings.warn(
             f"case {case}: the energies of the march do not add up by {miss[:, case].max():.3g} J of "

@@ -1,4 +1,4 @@
-"""Dead loads: pressures, tractions, forces on surfaces, lines and points, and gravity."""
+"""Loads: pressures, tractions, forces on surfaces, lines and points, and gravity; all but one are dead."""
 
 from __future__ import annotations
 
@@ -30,6 +30,15 @@ class Clamp:
 @dataclass(frozen=True)
 class Pressure:
     """A dead pressure in Pa against the outward normals of the undeformed surface."""
+
+    name: str
+    surface: str
+    pressure: float
+
+
+@dataclass(frozen=True)
+class FollowerPressure:
+    """A pressure in Pa against the outward normals of the surface as it deforms: it turns and stretches with it."""
 
     name: str
     surface: str
@@ -75,7 +84,8 @@ class Gravity:
     bodies: tuple[str, ...] = ()
 
 
-Load = Clamp | Pressure | Traction | Force | PointForce | Gravity
+DeadLoad = Clamp | Pressure | Traction | Force | PointForce | Gravity
+Load = DeadLoad | FollowerPressure
 
 
 @dataclass(frozen=True)
@@ -93,15 +103,18 @@ def load_vector(load: Load, assembly: Assembly) -> FloatArray:
 
     Raises
     ------
-    FemInputError : unknown names, a point outside all bodies, numbers that are not finite.
+    FemInputError : unknown names, a point outside all bodies, numbers that are not finite, a follower pressure.
     """
+    if isinstance(load, FollowerPressure):
+        advice = "give it to build_model, or use Pressure"
+        raise FemInputError("a pressure that follows has no dead force", where=f"load {load.name}", advice=advice)
     nodal = _nodal(load, assembly)
     if not np.isfinite(nodal).all():
         raise FemInputError("the load is not finite", where=f"load {load.name}", advice="check its numbers")
     return np.asarray(nodal).ravel()
 
 
-def _nodal(load: Load, assembly: Assembly) -> FloatArray:
+def _nodal(load: DeadLoad, assembly: Assembly) -> FloatArray:
     where = f"load {load.name}"
     if isinstance(load, Clamp | Pressure):
         return _pressure(load, assembly)

@@ -78,6 +78,7 @@ def solve_modes(
     Closed points are stuck (k_n, k_t), open points carry nothing. The shift at 0 needs stiffness: a body that nothing
     holds raises ``FemInputError``, an unstable equilibrium ``FemConvergenceError``. With a positive shift, of the order
     of the lowest elastic frequency, free bodies are allowed: their rigid modes come out with omega = 0 within roundoff.
+    Of the load stiffness of follower pressures the symmetric part is taken: all of it where they have a potential.
     """
     state.check_belongs(model)
     require_whole("modes", "count", count, 1, most=int(model.free.sum()) - 1)
@@ -85,7 +86,9 @@ def solve_modes(
     if shift_hz == 0.0:
         check_restraint(model)
         check_closed(model, state.contact.status[:, 0], "modes")
-    elastic = model.elastic_tangent(state.u)
+    elastic = model.following(state.follower).elastic_tangent(state.u)
+    if model.followers.any:
+        elastic = (0.5 * (elastic + elastic.T)).tocsr()
     tangent = model.constrain(elastic + model.contact.stick_tangent(state.contact.status[:, 0]))
     keep = sp.diags(model.free.astype(float))
     mass = (keep @ model.mass @ keep).tocsr()

@@ -16,7 +16,7 @@ from fem.rigid_motion import check_closed, check_restraint
 
 
 def unstable_directions(model: Model, state: StaticState) -> int:
-    """Number of independent directions in which an equilibrium under dead loads gives way: 0 where it is stable.
+    """Number of independent directions in which an equilibrium gives way under its loads: 0 where it is stable.
 
     K = L D L' has as many negative pivots as negative eigenvalues (Sylvester). Newton finds unstable equilibria as
     well as stable ones, such as the straight state of a column above its critical load, and says nothing. Closed points
@@ -29,7 +29,9 @@ def unstable_directions(model: Model, state: StaticState) -> int:
     state.check_belongs(model)
     check_restraint(model)
     check_closed(model, state.contact.status[:, 0], "stability")
-    tangent = model.elastic_tangent(state.u) + model.contact.stick_tangent(state.contact.status[:, 0])
+    elastic = model.following(state.follower).elastic_tangent(state.u)
+    # The part of follower pressures that has no potential is left out: it may make a state flutter, not buckle.
+    tangent = 0.5 * (elastic + elastic.T) + model.contact.stick_tangent(state.contact.status[:, 0])
     return negative_pivots(model.constrain(tangent))
 
 

@@ -219,5 +219,6 @@ class StepEquation:
         friction = self.dynamics.model.contact.dissipated(contact.traction, old.slip, contact.slip)
         load = (1.0 - af) * p_new + af * p_old
         damped, given = (np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, load))
+        given = given + self.dynamics.follower_work(old.u, new.u, 1.0 - af)
         given = given + self.dynamics.support_work(old, new, (self.scheme.alpha_m, af), load)
         return np.stack([friction, damped, given])
