@@ -28,9 +28,11 @@ class SupportForces:
             nodes, axes = components(model.bodies, model.offsets, support)
             for axis in axes:
                 owner[nodes, axis] = number
-        rows = 3 * owner.ravel()[self._held] + self._held % 3
-        entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
-        self.share = sp.csr_matrix(entries, shape=(3 * len(model.supports), len(rows)))
+        # A model whose ``free`` was replaced by hand holds more than its supports do.
+        columns = np.flatnonzero(owner.ravel()[self._held] >= 0)
+        rows = 3 * owner.ravel()[self._held[columns]] + self._held[columns] % 3
+        entries = (np.ones(len(rows)), (rows, columns))
+        self.share = sp.csr_matrix(entries, shape=(3 * len(model.supports), len(self._held)))
 
     def __call__(self, state: MotionState, acceleration: FloatArray, load: FloatArray) -> FloatArray:
         """R (n_held, n_case) N in a state, with u'' (n_dof, n_case) m/s^2 and p (n_dof, n_case) N at its time."""

@@ -237,3 +237,15 @@ def test_springs_of_one_name_are_refused() -> None:
     twice = [Spring("s", (x, 0.005, 0.01), (1e3, 1e3, 1e3)) for x in (0.0, 0.3)]
     with pytest.raises(FemInputError, match="springs of the same name; got s; give each a name of its own"):
         build_model([body], springs=twice)
+
+
+def test_components_held_by_no_support_belong_to_none() -> None:
+    """A model with more held by hand than its supports say: they keep what is theirs."""
+    model = _cantilever()
+    by_hand = replace(model, free=model.free & (np.arange(model.n_dof) % 3 != 2))
+    rest = rest_state(by_hand)
+    march = Transient(by_hand, rest, no_modes(by_hand, rest), PLAIN, TransientSettings(1e-4))
+    velocity = by_hand.direction("y")[:, None] * by_hand.free[:, None]
+    seen = record_history(march, march.start(0.0 * velocity, velocity), 2, _no_sensor(by_hand))
+    assert seen.reaction.shape == (3, 1, 3, 1)
+    assert np.all(seen.reaction[1:, 0, 1, 0] != 0.0)
