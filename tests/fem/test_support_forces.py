@@ -170,7 +170,7 @@ def test_at_rest_they_are_the_static_ones() -> None:
 
 
 def test_marches_and_campaigns_go_on_as_if_they_had_not_stopped() -> None:
-    """Two halves equal the whole, two cases equal one each, bit by bit; the campaign shows what the history shows."""
+    """Two halves equal the whole bit by bit, two cases together; the campaign shows what the history shows."""
     model = _cantilever()
     rest = rest_state(model)
     modes = solve_modes(model, rest, 2)

@@ -49,6 +49,10 @@ def test_load_stiffness_is_the_derivative(element: str) -> None:
         difference = (ahead - behind) / (2.0 * h)
         np.testing.assert_allclose(stiffness @ d, difference, atol=1e-10 * np.abs(difference).max())
     assert np.abs(stiffness - stiffness.T).max() > 0.01 * np.abs(stiffness).max()
+    both = model.followers.force(np.column_stack([u, 2.0 * u]))
+    for column, share in zip(both.T, (1.0, 2.0), strict=True):
+        alone = model.followers.force(share * u[:, None])[:, 0]
+        np.testing.assert_allclose(column, alone, atol=1e-14 * np.abs(alone).max())
 
 
 def test_closed_surfaces_are_in_balance_and_have_a_potential() -> None:
