@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
-from fem.bounds import require_whole
+from fem.bounds import require_count
 from fem.element import reference_element
 from fem.errors import FemInputError
 from fem.finite_values import finite_array
@@ -35,7 +35,7 @@ def graded(breakpoints: Sequence[float], cells: Sequence[int]) -> FloatArray:
             value=f"{len(breakpoints)} breakpoints and {len(cells)} counts",
         )
     for count in cells:
-        require_whole("block", "cell count", count, 1)
+        require_count("block", "a cell count", count, 1)
     if np.any(np.diff(breakpoints) <= 0.0):
         raise FemInputError("breakpoints must increase", where="block", value=list(breakpoints))
     parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(breakpoints, breakpoints[1:], cells, strict=False)]

@@ -17,8 +17,10 @@ def require(where: str, name: str, value: object, least: float, *, above: bool =
     raise FemInputError(f"{name} out of range", where=where, value=value, advice=f"give a number {bound}")
 
 
-def require_whole(where: str, name: str, value: object, least: int, *, most: float = math.inf) -> None:
-    """Refuse a count that is no whole number, 2.0 included, or outside its bounds."""
-    if isinstance(value, Real) and not isinstance(value, Integral):
-        raise FemInputError(f"{name} must be a whole number", where=where, value=value, advice="give a number like 3")
-    require(where, name, value, least, most=most)
+def require_count(where: str, name: str, value: object, least: int, *, most: float = math.inf) -> None:
+    """Refuse a count that is not a whole number from ``least`` to ``most``; 2.5 steps, and 2.0, are none."""
+    if isinstance(value, Integral) and least <= int(value) <= most:
+        return
+    bound = f"at least {least}" + (f" and at most {most:g}" if most < math.inf else "")
+    advice = f"give a whole number {bound}"
+    raise FemInputError(f"{name} out of range", where=where, value=value, advice=advice)

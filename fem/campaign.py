@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.arrays import FloatArray, IntArray
-from fem.bounds import require_whole
+from fem.bounds import require_count
 from fem.central_difference import ExplicitTransient
 from fem.dynamics import Dynamics
 from fem.errors import FemError, FemInputError
@@ -159,9 +159,9 @@ def march_campaign(
     Nothing but the state passes from one segment to the next, so that a resumed campaign repeats the same numbers bit
     by bit.
     """
-    require_whole("campaign", "n_step", n_step, 0)
-    require_whole("campaign", "segment_steps", segment_steps, 1)
-    require_whole("observation", "stride", observation.stride, 1)
+    require_count("campaign", "n_step", n_step, 0)
+    require_count("campaign", "segment_steps", segment_steps, 1)
+    require_count("observation", "stride", observation.stride, 1)
     rows: list[_Row] = []
     if restart is not None:
         state = restart

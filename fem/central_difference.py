@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem.arrays import FloatArray
-from fem.bounds import require_whole
+from fem.bounds import require_count
 from fem.contact import ContactState
 from fem.critical_step import critical_step
 from fem.dynamics import Dynamics
@@ -115,7 +115,7 @@ class ExplicitTransient:
 
     def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
         """Yield ``n_step`` outputs from ``state``; a march that blows up raises ``FemConvergenceError``."""
-        require_whole("explicit transient", "n_step", n_step, 0)
+        require_count("transient", "n_step", n_step, 0)
         for _ in range(n_step):
             for number in range(1, self.substeps + 1):
                 state, contact, strain = self._advance(state, state.step + number / self.substeps)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from fem.arrays import FloatArray
-from fem.bounds import require, require_whole
+from fem.bounds import require, require_count
 from fem.errors import FemConvergenceError, FemInputError
 from fem.finite_values import finite_array
 from fem.linear_solver import make_solver
@@ -81,7 +81,7 @@ def solve_modes(
     Of the load stiffness of follower pressures the symmetric part is taken: all of it where they have a potential.
     """
     state.check_belongs(model)
-    require_whole("modes", "count", count, 1, most=int(model.free.sum()) - 1)
+    require_count("modes", "count", count, 1, most=int(model.free.sum()) - 1)
     require("modes", "shift_hz", shift_hz, 0.0)
     if shift_hz == 0.0:
         check_restraint(model)

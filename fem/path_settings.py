@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fem.bounds import require, require_whole
+from fem.bounds import require, require_count
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class PathSettings:
     solver: str = "auto"
 
     def __post_init__(self) -> None:
-        require_whole("path settings", "max_iterations", self.max_iterations, 1)
-        require_whole("path settings", "max_steps", self.max_steps, 1)
+        require_count("path settings", "max_iterations", self.max_iterations, 1)
+        require_count("path settings", "max_steps", self.max_steps, 1)
         for name in ("step", "largest_step", "smallest_step", "tolerance"):
             require("path settings", name, getattr(self, name), 0.0, above=True)

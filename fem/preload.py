@@ -9,7 +9,7 @@ import numpy as np
 
 from fem.arrays import FloatArray
 from fem.bolt import warn_of_slack
-from fem.bounds import require, require_whole
+from fem.bounds import require, require_count
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.finite_values import as_numbers, finite_array
@@ -73,8 +73,9 @@ class StaticSettings:
     cuts: int = 6
 
     def __post_init__(self) -> None:
-        for name, least in (("steps", 1), ("max_iterations", 1), ("cuts", 0)):
-            require_whole("static settings", name, getattr(self, name), least)
+        require_count("static settings", "steps", self.steps, 1)
+        require_count("static settings", "max_iterations", self.max_iterations, 1)
+        require_count("static settings", "cuts", self.cuts, 0)
         require("static settings", "tolerance", self.tolerance, 0.0, above=True)
 
 

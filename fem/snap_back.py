@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem.arrays import FloatArray
-from fem.bounds import require_whole
+from fem.bounds import require_count
 from fem.errors import FemConvergenceError
 from fem.model import Model
 from fem.modes import ModalBasis
@@ -39,8 +39,8 @@ def hold_modes(
     tolerance : residual relative to the linear modal force omega^2 M phi eta, or what rounding leaves of it.
     max_iterations : of Newton, per step.
     """
-    require_whole("start of a ring-down", "steps", steps, 1)
-    require_whole("start of a ring-down", "max_iterations", max_iterations, 1)
+    require_count("held modes", "steps", steps, 1)
+    require_count("held modes", "max_iterations", max_iterations, 1)
     hold = _Hold(model, equilibrium, modes, (eta, steps), (tolerance, max_iterations, solver))
     for step in range(1, steps + 1):
         hold.advance(step)

@@ -15,7 +15,7 @@ import numpy as np
 
 from fem.anderson import Anderson
 from fem.arrays import FloatArray
-from fem.bounds import require, require_whole
+from fem.bounds import require, require_count
 from fem.corrector import Corrector
 from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError, FemInputError
@@ -81,8 +81,10 @@ class TransientSettings:
     def __post_init__(self) -> None:
         if not 0.0 < self.time_step < math.inf:
             raise FemInputError("time step must be positive and finite", where="transient", value=self.time_step)
-        for name in ("depth", "max_iterations", "max_cutbacks", "max_doublings", "corrected_modes", "refactor_above"):
-            require_whole("transient", name, getattr(self, name), int(name in ("depth", "max_iterations")))
+        for name in ("depth", "max_iterations"):
+            require_count("transient", name, getattr(self, name), 1)
+        for name in ("max_cutbacks", "max_doublings", "corrected_modes", "refactor_above"):
+            require_count("transient", name, getattr(self, name), 0)
         require("transient", "tolerance", self.tolerance, 0.0, above=True)
         require("transient", "spectral_radius", self.spectral_radius, 0.0, most=1.0)
         if self.method not in METHODS:
@@ -184,7 +186,7 @@ class Transient:
         A step that converges at no allowed size raises ``FemConvergenceError`` with its residual history; what was
         yielded is good. March on from ``resume`` of the last record.
         """
-        require_whole("transient", "n_step", n_step, 0)
+        require_count("transient", "n_step", n_step, 0)
         n_case, end = state.u.shape[1], state.step + n_step
         anderson = Anderson(self.model.n_dof, n_case, self.settings.depth)
         effort = Effort.none(n_case)
