@@ -101,7 +101,7 @@ def locate(bodies: Sequence[Body], name: str, *, where: str = "model", surface: 
         if surface and part in mesh.node_sets:
             what = "a set of nodes is no surface"
         advice = f"{nearest(part, known, 'known surfaces:')} on body {body}"
-        raise FemInputError(what, where=where, value=name, advice=advice)
+        raise FemInputError(what, where=where, value=part, advice=advice)
     return names.index(body), region
 
 
