@@ -3,9 +3,9 @@
 The names below are what a case needs; docs/finite_elements.md sets one up.
 """
 
-from fem.arc_length import EquilibriumPath, PathSettings, follow_path
+from fem.arc_length import EquilibriumPath, follow_path
 from fem.block import graded, hex_block
-from fem.bolt import Bolt
+from fem.bolt import Bolt, PreloadWarning
 from fem.campaign import Observation, Starts, march_campaign, modal_coordinates, modal_starts, snap_back_starts
 from fem.central_difference import ExplicitSettings, ExplicitTransient
 from fem.contact_report import PenaltyReport, penalty_reports
@@ -15,7 +15,7 @@ from fem.excitation import SupportMotion, TimeLoad, base_load, support_motion, t
 from fem.history import EnergyWarning, History, record_history
 from fem.inp_writer import nodal_loads, write_inp
 from fem.interfaces import Pair, Tie
-from fem.loads import Clamp, Force, Gravity, PointForce, Pressure, Traction
+from fem.loads import Clamp, FollowerPressure, Force, Gravity, PointForce, Pressure, Traction
 from fem.material import Material
 from fem.merge import merged
 from fem.mesh import Mesh, within
@@ -30,6 +30,7 @@ from fem.modal_quantities import (
 from fem.model import Body, Model, build_model
 from fem.modes import ModalBasis, Rayleigh, no_modes, rayleigh, rest_state, solve_modes
 from fem.motion import MotionState, StepRecord
+from fem.path_settings import PathSettings
 from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
 from fem.reach import ReachWarning, TieWarning
 from fem.reaction import reaction, reaction_moment
@@ -37,6 +38,7 @@ from fem.read_mesh import read_mesh
 from fem.sensor import Sensor, SensorWarning, sensor_rows
 from fem.sliding import SlidingWarning
 from fem.springs import Foundation, PointMass, Spring
+from fem.stability import unstable_directions
 from fem.stress import integration_point_stress, nodal_stress, point_stress
 from fem.supports import Support
 from fem.tightening import bolt_force
@@ -53,6 +55,7 @@ __all__ = [
     "FemConvergenceError",
     "FemError",
     "FemInputError",
+    "FollowerPressure",
     "Force",
     "Foundation",
     "Gravity",
@@ -69,6 +72,7 @@ __all__ = [
     "PenaltyReport",
     "PointForce",
     "PointMass",
+    "PreloadWarning",
     "Pressure",
     "Rayleigh",
     "ReachWarning",
@@ -125,6 +129,7 @@ __all__ = [
     "support_motion",
     "time_load",
     "total_masses",
+    "unstable_directions",
     "within",
     "write_inp",
 ]

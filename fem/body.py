@@ -10,7 +10,8 @@ import numpy as np
 from fem.arrays import FloatArray
 from fem.errors import FemInputError
 from fem.material import Material
-from fem.mesh import Mesh
+from fem.mesh import SKIN, Mesh
+from fem.names import nearest
 
 KINEMATICS = ("green_lagrange", "linear")
 
@@ -21,7 +22,7 @@ class Body:
 
     Attributes
     ----------
-    name : no dot in it; "<name>.<surface>" names what lies on the body.
+    name : without a dot, since "<name>.<surface>" names what lies on the body.
     kinematics : "green_lagrange" keeps all terms; "linear" drops the quadratic strain of this body: its error is of
         the order of its strains and rotations, and it saves the element loop.
     initial_stress : second Piola-Kirchhoff stress in Pa that the undeformed body already carries, S = S_0 + C:E:
@@ -29,7 +30,8 @@ class Body:
 
     Raises
     ------
-    FemInputError : unknown kinematics, or an initial stress that is not a symmetric, finite (3, 3) tensor.
+    FemInputError : a name that is empty or has a dot, unknown kinematics, a mesh with nodes in no cell, or an initial
+        stress that is not a symmetric, finite (3, 3) tensor.
     """
 
     name: str
@@ -40,6 +42,13 @@ class Body:
 
     def __post_init__(self) -> None:
         where = f"body {self.name}"
+        if not isinstance(self.name, str) or not self.name or "." in self.name:
+            advice = 'give a name without a dot: "<body>.<surface>" names what lies on it'
+            raise FemInputError("not a name for a body", where="body", value=repr(self.name), advice=advice)
+        lonely = np.setdiff1d(np.arange(len(self.mesh.points)), self.mesh.cells)
+        if len(lonely):
+            value = f"node {lonely[0]} at {self.mesh.points[lonely[0]]} and {len(lonely) - 1} others"
+            raise FemInputError("nodes belong to no cell", where=where, value=value, advice="drop them from the mesh")
         if self.kinematics not in KINEMATICS:
             advice = f"choose {' or '.join(KINEMATICS)}"
             raise FemInputError("unknown kinematics", where=where, value=self.kinematics, advice=advice)
@@ -63,11 +72,38 @@ class Body:
         return np.ascontiguousarray(np.broadcast_to(np.asarray(self.initial_stress, dtype=float), shape))
 
 
-def locate(bodies: Sequence[Body], name: str) -> tuple[int, str]:
-    """Index of the body and the name on it, from "<body>.<name>"; an unknown body raises ``FemInputError``."""
-    body, _, region = name.partition(".")
+def locate(bodies: Sequence[Body], name: str, *, where: str = "model", surface: bool = False) -> tuple[int, str]:
+    """Index of the body and the name on it, from "<body>.<name>".
+
+    Parameters
+    ----------
+    where : who asks, for the errors.
+    surface : only surfaces will do; otherwise node sets, and "a&b" for the nodes that both have, too.
+
+    Raises
+    ------
+    FemInputError : an unknown name, with those nearest to it.
+    """
+    body, _, region = str(name).partition(".")
     names = [b.name for b in bodies]
+    what = "unknown surface" if surface else "unknown surface or node set"
     if body not in names or not region:
-        advice = f"surfaces are <body>.<surface> with the bodies {', '.join(names)}"
-        raise FemInputError("unknown surface", where="model", value=name, advice=advice)
+        known = [f"{b.name}.{r}" for b in bodies for r in _regions(b.mesh, surface=surface)]
+        advice = (
+            f"names are <body>.<surface> with the bodies {', '.join(names)}; {nearest(str(name), known, 'known are')}"
+        )
+        raise FemInputError(what, where=where, value=name, advice=advice)
+    mesh = bodies[names.index(body)].mesh
+    known = _regions(mesh, surface=surface)
+    for part in [region] if surface or region in known else region.split("&"):
+        if part in known or part == SKIN:
+            continue
+        if surface and part in mesh.node_sets:
+            what = "a set of nodes is no surface"
+        advice = f"{nearest(part, known, 'known surfaces:')} on body {body}"
+        raise FemInputError(what, where=where, value=part, advice=advice)
     return names.index(body), region
+
+
+def _regions(mesh: Mesh, *, surface: bool) -> list[str]:
+    return [*mesh.surfaces] if surface else [*mesh.surfaces, *mesh.node_sets]

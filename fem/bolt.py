@@ -7,6 +7,7 @@ cut runs along faces of cells, flat or not (pretension sections of ANSYS and Aba
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,11 +17,18 @@ from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.body import Body
 from fem.contact import Contact
 from fem.errors import FemInputError
+from fem.finite_values import finite_vector
 from fem.interfaces import Tie
+from fem.loads import Vector
 from fem.mesh import Mesh
+from fem.names import nearest
 from fem.supports import AXES
 
 THREAD_SIDE, HEAD_SIDE = "section_thread", "section_head"
+
+
+class PreloadWarning(UserWarning):
+    """Something is computed with bolts that nothing has tightened."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +39,16 @@ class Bolt:
     ----------
     body : name of the meshed bolt; its thread is bonded by a ``Tie`` and its head pressed on by a ``Pair``.
     force : N, tension positive.
-    axis : "x", "y" or "z".
-    section : coordinate along the axis, m, near which the shank is cut; default the middle of the body.
+    axis : "x", "y", "z", or a direction (x, y, z) of any length, such as head point less thread point; either way.
+    section : coordinate x . a along the unit vector a of the axis, m, near which the shank is cut; default the middle
+        of the body.
     stiffness : of the section in multiples of E / h: 1000 adds a thousandth of a facet size to the length of the bolt.
     """
 
     name: str
     body: str
     force: float
-    axis: str = "y"
+    axis: str | Vector = "y"
     section: float | None = None
     stiffness: float = 1000.0
 
@@ -47,8 +56,19 @@ class Bolt:
         where = f"bolt {self.name}"
         if not (np.isfinite(self.force) and self.force > 0.0):
             raise FemInputError("the bolt force must be positive", where=where, value=self.force)
-        if self.axis not in AXES:
-            raise FemInputError("unknown axis", where=where, value=self.axis, advice="choose x, y or z")
+        if isinstance(self.axis, str) and self.axis not in AXES:
+            advice = "choose x, y, z or a direction (x, y, z)"
+            raise FemInputError("unknown axis", where=where, value=self.axis, advice=advice)
+        if not isinstance(self.axis, str) and not finite_vector(self.axis, "the axis", where=where).any():
+            raise FemInputError("the axis has no direction", where=where, value=self.axis)
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector (3,) of the axis."""
+        if isinstance(self.axis, str):
+            return np.asarray(np.eye(3)[AXES[self.axis]])
+        given = np.asarray(self.axis, dtype=float)
+        return np.asarray(given / np.linalg.norm(given))
 
 
 @dataclass(frozen=True)
@@ -78,13 +98,21 @@ class BoltSet:
         return np.asarray(self.pull @ u + (own if u.ndim == 1 else own[:, None]))
 
 
+def warn_of_slack(bolts: BoltSet, who: str) -> None:
+    """Issue ``PreloadWarning`` where bolts have not been tightened; ``who`` goes on without their forces."""
+    slack = [bolt.name for bolt, delta in zip(bolts.bolts, bolts.shortening, strict=True) if delta == 0.0]
+    if slack:
+        advice = "solve_preload tightens them and returns the model to go on with"
+        warnings.warn(f"{who}: bolts {', '.join(slack)} are not tightened; {advice}", PreloadWarning, stacklevel=3)
+
+
 def cut_bolts(bodies: Sequence[Body], bolts: Sequence[Bolt]) -> tuple[tuple[Body, ...], tuple[Tie, ...]]:
     """Bodies with their shanks cut and the ties that close the cuts again; an unknown body raises ``FemInputError``."""
     by_name = {body.name: body for body in bodies}
     ties = []
     for bolt in bolts:
         if bolt.body not in by_name:
-            advice = f"bodies are {', '.join(by_name)}"
+            advice = nearest(bolt.body, by_name, "bodies are")
             raise FemInputError("unknown body", where=f"bolt {bolt.name}", value=bolt.body, advice=advice)
         body = by_name[bolt.body]
         if HEAD_SIDE in body.mesh.surfaces:
@@ -99,7 +127,7 @@ def bolt_set(bolts: Sequence[Bolt], sections: Sequence[Contact], n_dof: int) -> 
     """Q = B' w k a and S = sum w k of every section, from the bonds that close the cuts."""
     pull, stiffness = [], []
     for bolt, bond in zip(bolts, sections, strict=True):
-        axis = bond.frame[:, :, AXES[bolt.axis]]
+        axis = bond.frame @ bolt.direction
         weighted = bond.area[:, None] * bond.law[:, [0, 1, 1]] * axis
         pull.append(bond.operator.T @ weighted.ravel())
         stiffness.append(float((weighted * axis).sum()))
@@ -109,7 +137,7 @@ def bolt_set(bolts: Sequence[Bolt], sections: Sequence[Contact], n_dof: int) -> 
 
 def _cut(mesh: Mesh, bolt: Bolt) -> Mesh:
     """The mesh with nodes doubled where cells before and behind the section meet, and both faces of the cut named."""
-    along = mesh.points[:, AXES[bolt.axis]]
+    along = mesh.points @ bolt.direction
     at = 0.5 * (along.min() + along.max()) if bolt.section is None else bolt.section
     ahead = along[mesh.cells].mean(axis=1) > at
     if ahead.all() or not ahead.any():

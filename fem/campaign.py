@@ -12,6 +12,7 @@ import numpy.typing as npt
 from fem.arrays import FloatArray, IntArray
 from fem.bounds import require_count
 from fem.central_difference import ExplicitTransient
+from fem.dynamics import Dynamics
 from fem.errors import FemError, FemInputError
 from fem.modes import ModalBasis
 from fem.motion import MotionState, StepRecord
@@ -25,6 +26,7 @@ class Marching(Protocol):
 
     equilibrium: StaticState
     rest_energies: FloatArray
+    dynamics: Dynamics
 
     def start(
         self, displacement: FloatArray, velocity: FloatArray, slip: FloatArray | None = None, *, settled: bool = False
@@ -83,6 +85,7 @@ class CampaignSegment:
     displacement, velocity : (n_time, n_sensor, n_case) m, m/s.
     energies : (n_time, 6, n_case) J: kinetic, strain, contact, relative to the equilibrium, then friction, damping,
         external work since t = 0.
+    reaction : (n_time, n_support, 3, n_case) N; spring : (n_time, n_spring, 3, n_case) N, see ``History``.
     iterations : (n_time, n_case), those of rejected steps included.
     effort : (n_time, 3) steps of the scheme, rejected steps and refreshed factors since the output before.
     snapshots : (n_snapshot, n_dof, n_case) m from the equilibrium; snapshot_steps : (n_snapshot,).
@@ -96,6 +99,8 @@ class CampaignSegment:
     displacement: FloatArray
     velocity: FloatArray
     energies: FloatArray
+    reaction: FloatArray
+    spring: FloatArray
     iterations: IntArray
     effort: IntArray
     snapshots: npt.NDArray[np.float32]
@@ -156,6 +161,7 @@ def march_campaign(
     """
     require_count("campaign", "n_step", n_step, 0)
     require_count("campaign", "segment_steps", segment_steps, 1)
+    require_count("observation", "stride", observation.stride, 1)
     rows: list[_Row] = []
     if restart is not None:
         state = restart
@@ -200,6 +206,8 @@ def _observe(record: StepRecord, transient: Marching, observation: Observation) 
         sensors @ moved,
         sensors @ state.v,
         np.concatenate([record.energies - transient.rest_energies, state.work]),
+        transient.dynamics.support_force.resultants(record),
+        transient.dynamics.spring_force.resultants(record),
         record.iterations,
         np.array([record.effort.substeps, record.effort.rejected, record.effort.factors]),
     )
@@ -209,7 +217,7 @@ def _observe(record: StepRecord, transient: Marching, observation: Observation) 
 
 def _segment(rows: list[_Row], state: MotionState) -> CampaignSegment:
     columns = [np.stack(column) for column in zip(*(row.fields for row in rows), strict=True)]
-    eta, eta_dot, eta_ddot, displacement, velocity, energies, iterations, effort = columns
+    eta, eta_dot, eta_ddot, displacement, velocity, energies, reaction, spring, iterations, effort = columns
     snapshots = [row.snapshot for row in rows if row.snapshot is not None]
     return CampaignSegment(
         steps=np.array([row.step for row in rows], dtype=np.int64),
@@ -219,6 +227,8 @@ def _segment(rows: list[_Row], state: MotionState) -> CampaignSegment:
         displacement=displacement,
         velocity=velocity,
         energies=energies,
+        reaction=reaction,
+        spring=spring,
         iterations=iterations.astype(np.int64),
         effort=effort.astype(np.int64),
         snapshots=np.array(snapshots, dtype=np.float32).reshape(len(snapshots), *state.u.shape),

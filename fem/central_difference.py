@@ -149,6 +149,7 @@ class ExplicitTransient:
         given = 0.5 * (dynamics.load(t - h, n_case) + load)
         friction = self.model.contact.dissipated(contact.traction, old.slip, contact.slip)
         work = [friction, *(np.einsum("nc,nc->c", p, u - old.u) for p in (damped, given))]
+        work[2] = work[2] + dynamics.follower_work(old.u, u, 0.5)
         new = replace(
             old,
             u=u,
@@ -167,4 +168,6 @@ class ExplicitTransient:
         state = replace(state, inertia_a=inertia_a, inertia_v=inertia_v, history=state.u[None])
         energies = self.dynamics.energies(inertia_v, state, strain, contact)
         effort = replace(Effort.none(state.u.shape[1]), substeps=substeps)
-        return StepRecord(state, contact, energies, inertia_a, effort, state)
+        load = self.dynamics.load(state.step * self.settings.time_step, state.u.shape[1])
+        held = self.dynamics.support_force(state, state.a, load)
+        return StepRecord(state, contact, energies, inertia_a, held, effort, state)

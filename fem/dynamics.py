@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bolt import warn_of_slack
 from fem.contact import ContactState
 from fem.errors import FemInputError
 from fem.excitation import SupportMotion, TimeLoad
@@ -18,6 +19,7 @@ from fem.modes import Rayleigh
 from fem.motion import MotionState, Pace
 from fem.preload import StaticState
 from fem.sparse_product import SparseProduct
+from fem.support_forces import SpringForces, SupportForces
 
 
 class Dynamics:
@@ -36,6 +38,7 @@ class Dynamics:
         motions: Sequence[SupportMotion] = (),
     ) -> None:
         equilibrium.check_belongs(model)
+        warn_of_slack(model.bolts, "transient")
         _check_time_functions(model, loads, TimeLoad, "time_load")
         _check_time_functions(model, motions, SupportMotion, "support_motion")
         self.model, self.equilibrium, self.loads, self.motions = model, equilibrium, tuple(loads), tuple(motions)
@@ -43,6 +46,7 @@ class Dynamics:
         self.mask = model.free[:, None].astype(float)
         self.damping_matrix = damping.alpha * model.mass + damping.beta * model.stiffness
         self.linear = LinearOperators(model.mass, model.stiffness)
+        self.support_force, self.spring_force = SupportForces(model), SpringForces(model, damping.beta)
         self._gap = SparseProduct(model.contact.operator)
         self._pull = SparseProduct(model.contact.operator.T.tocsr())
         rest = equilibrium.u[:, None]
@@ -91,6 +95,14 @@ class Dynamics:
         for motion in self.motions:
             given += np.outer(motion.pattern, motion.at(t, u.shape[1]))
         return np.where(self.mask > 0.0, u, given)
+
+    def follower_work(self, old: FloatArray, new: FloatArray, share: float) -> FloatArray:
+        """Work (n_case,) J of the follower pressures on the way to ``new``, by ``share`` of their force there."""
+        followers = self.model.followers
+        if not followers.any:
+            return np.zeros(new.shape[1])
+        force = share * followers.force(new) + (1.0 - share) * followers.force(old)
+        return np.asarray(np.einsum("nc,nc->c", force, new - old))
 
     def support_work(
         self, old: MotionState, new: MotionState, weights: tuple[float, float], load: FloatArray

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 
 class FemError(Exception):
-    """Base of the failures that ``fem`` raises on purpose."""
+    """Base of the failures that ``fem`` raises on purpose; ``last_good`` is what was computed before, or None."""
 
     exit_code = 1
 
     def __init__(self, what: str, *, where: str = "", value: object = None, advice: str = "") -> None:
         self.what, self.where, self.value, self.advice = what, where, value, advice
+        self.last_good: object = None
         parts = [f"{where}: {what}" if where else what]
         if value is not None:
             parts.append(f"got {value if isinstance(value, str) else repr(value)}")
@@ -40,5 +41,4 @@ class FemConvergenceError(FemError):
     ) -> None:
         super().__init__(what, where=where, value=value, advice=advice)
         self.history = history
-        self.last_good: object = None
         self.last_contact: object = None

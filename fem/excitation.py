@@ -75,9 +75,9 @@ def support_motion(
     FemInputError : unknown names or directions, components that are not held, another number of factors, a motion that
         does not start at 0.
     """
-    index, name = locate(model.bodies, region)
-    nodes = model.bodies[index].mesh.nodes(name) + model.offsets[index]
     where = f"motion of {region}"
+    index, name = locate(model.bodies, region, where=where)
+    nodes = model.bodies[index].mesh.nodes(name, where=where) + model.offsets[index]
     unknown = [direction for direction in directions if direction not in AXES]
     if unknown:
         raise FemInputError("unknown direction", where=where, value=unknown[0], advice="choose x, y or z")

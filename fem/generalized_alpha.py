@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from fem.arrays import FloatArray
 from fem.errors import FemInputError
 
 
@@ -27,6 +28,10 @@ class Scheme:
         alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
         difference = 1.0 - alpha_m + alpha_f
         return Scheme(alpha_m, alpha_f, 0.25 * difference**2, 0.5 - alpha_m + alpha_f)
+
+    def timely(self, a: FloatArray, rise: FloatArray) -> FloatArray:
+        """u'' at the end of a step from its ``a``, which stands for a time (af - am) h earlier, and its ``rise``."""
+        return a + (self.alpha_f - self.alpha_m) * rise
 
     def discrete_frequency(self, omega: float, step: float) -> float:
         """Frequency in rad/s with which the scheme oscillates for an undamped mode omega at that time step."""

@@ -10,6 +10,7 @@ import numpy as np
 from fem.arrays import FloatArray
 from fem.bounds import require_count
 from fem.central_difference import ExplicitTransient
+from fem.errors import FemError
 from fem.finite_values import check_rows
 from fem.motion import MotionState, StepRecord
 from fem.reach import no_depth, warn_of_reach
@@ -18,6 +19,9 @@ from fem.transient import Transient
 
 OPEN = 0.1
 """Share of the energy that went through a march which its ledger may miss without a warning."""
+
+ROUNDING = 1e-10
+"""Share of the energy stored at rest whose appearance or loss counts as rounding."""
 
 
 class EnergyWarning(UserWarning):
@@ -36,6 +40,10 @@ class History:
     kinetic, strain, contact : (n_time, n_case) J, relative to the equilibrium.
     friction, damping, external : (n_time, n_case) J, work since the first state; external that of loads and supports.
     force : (n_time, n_pair, 3, n_case) N, resultant of the tractions of every pair on its master.
+    reaction : (n_time, n_support, 3, n_case) N, resultant of every support of the model, the static part included; what
+        two supports hold counts for the first of them. It balances loads and inertia: exactly for central differences,
+        to O(h^2) for generalised-alpha.
+    spring : (n_time, n_spring, 3, n_case) N, force of every spring and foundation, its damping beta k u' included.
     closed, slipping : (n_time, n_pair, n_case) m^2, area in contact and the part of it that slips.
     state : to march on from.
     """
@@ -51,6 +59,8 @@ class History:
     damping: FloatArray
     external: FloatArray
     force: FloatArray
+    reaction: FloatArray
+    spring: FloatArray
     closed: FloatArray
     slipping: FloatArray
     state: MotionState
@@ -72,24 +82,36 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
     ----------
     sensors : (n_sensor, n_dof) rows of ``sensor_rows``.
 
-    Issues ``SlidingWarning``, ``ReachWarning`` and ``EnergyWarning``. Raises as the march does; ``march_campaign``
-    hands on what a failed march computed.
+    Issues ``SlidingWarning``, ``ReachWarning`` and ``EnergyWarning``. Raises as the march does; the history up to
+    there is in ``last_good`` of the error.
     """
     require_count("history", "n_step", n_step, 0)
     check_rows(sensors, transient.model.n_dof, where="history")
     contact = transient.model.contact
     last = transient.observe(state)
     rows, slid, depth = [_row(last, transient, sensors)], np.zeros(contact.n_point), no_depth(contact.left_out)
-    for record in transient.march(state, n_step):
-        rows.append(_row(record, transient, sensors))
-        slid = np.maximum(slid, sliding_motion(contact, contact.relative(record.state.u), record.contact.status))
-        depth = np.maximum(depth, contact.left_out.depth(record.state.u))
-        last = record
+    try:
+        for record in transient.march(state, n_step):
+            rows.append(_row(record, transient, sensors))
+            slid = np.maximum(slid, sliding_motion(contact, contact.relative(record.state.u), record.contact.status))
+            depth = np.maximum(depth, contact.left_out.depth(record.state.u))
+            last = record
+    except FemError as error:
+        error.last_good = _history(rows, state, last, transient.settings.time_step)
+        raise
+    history = _history(rows, state, last, transient.settings.time_step)
+    warn_of_sliding(contact, slid)
+    warn_of_reach(contact.names, contact.left_out, depth)
+    warn_of_imbalance(history, ROUNDING * float(transient.rest_energies.sum()))
+    return history
+
+
+def _history(rows: list[tuple[FloatArray, ...]], first: MotionState, last: StepRecord, step: float) -> History:
     columns = [np.stack(column) for column in zip(*rows, strict=True)]
-    motion, energies, done, force, areas = columns
-    done = done - state.work
-    history = History(
-        t=np.asarray((state.step + np.arange(len(rows))) * transient.settings.time_step),
+    motion, energies, done, force, reaction, spring, areas = columns
+    done = done - first.work
+    return History(
+        t=np.asarray((first.step + np.arange(len(rows))) * step),
         displacement=motion[:, 0],
         velocity=motion[:, 1],
         acceleration=motion[:, 2],
@@ -100,23 +122,24 @@ def record_history(transient: Marching, state: MotionState, n_step: int, sensors
         damping=done[:, 1],
         external=done[:, 2],
         force=force,
+        reaction=reaction,
+        spring=spring,
         closed=areas[:, 0],
         slipping=areas[:, 1],
         state=last.resume,
     )
-    warn_of_sliding(contact, slid)
-    warn_of_reach(contact.names, contact.left_out, depth)
-    warn_of_imbalance(history)
-    return history
 
 
-def warn_of_imbalance(history: History) -> None:
-    """Issue ``EnergyWarning`` where the ledger is open by more than OPEN of the energy that went through the march."""
+def warn_of_imbalance(history: History, rounding: float = 0.0) -> None:
+    """Issue ``EnergyWarning`` where the ledger is open by more than OPEN of the energy that went through the march.
+
+    Nothing below ``rounding`` J is said: a loaded structure that stays at rest has no other energies.
+    """
     stored = history.kinetic + history.strain + history.contact
     spent = history.friction + history.damping
     through = np.abs(np.stack([history.kinetic, stored - stored.min(axis=0), spent, history.external])).max(axis=(0, 1))
     miss = np.abs(history.imbalance)
-    for case in np.flatnonzero(miss.max(axis=0) > OPEN * through):
+    for case in np.flatnonzero(miss.max(axis=0) > np.maximum(OPEN * through, rounding)):
         first = int(np.argmax(miss[:, case] > OPEN * through[case]))
         warnings.warn(
             f"case {case}: the energies of the march do not add up by {miss[:, case].max():.3g} J of "
@@ -138,5 +161,7 @@ def _row(record: StepRecord, transient: Marching, sensors: FloatArray) -> tuple[
         record.energies - transient.rest_energies,
         state.work,
         np.einsum("pg,gij,gic->pjc", member, contact.frame, traction),
+        transient.dynamics.support_force.resultants(record),
+        transient.dynamics.spring_force.resultants(record),
         np.stack([member @ (status > 0), member @ (status == 2)]),
     )

@@ -30,7 +30,7 @@ def write_inp(path: Path | str, model: Model) -> None:
     Raises
     ------
     FemInputError : HEX27 cells, which CalculiX does not have, an initial stress, bolts, springs, point masses,
-        supports that move.
+        supports that move, follower pressures.
     """
     path = Path(path)
     _check(path, model)
@@ -57,6 +57,8 @@ def _check(path: Path, model: Model) -> None:
     if model.springs.names or model.point_masses:
         names = (*model.springs.names, *(mass.name for mass in model.point_masses))
         raise FemInputError("springs and point masses are not written", where=path.name, value=", ".join(names))
+    if model.followers.patches:
+        raise FemInputError("follower pressures are not written", where=path.name, value=len(model.followers.patches))
     if np.any(model.prescribed):
         raise FemInputError("only supports at rest are written", where=path.name)
 

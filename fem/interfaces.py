@@ -128,15 +128,16 @@ def _penalty(bodies: Sequence[Body], joint: Pair | Tie) -> float:
         raise FemInputError("stiffness must be positive and finite", where=f"joint {joint.name}", value=joint.stiffness)
     if joint.reach is not None:
         require(f"joint {joint.name}", "reach", joint.reach, 0.0, above=True)
-    index, slave = locate(bodies, joint.slave)
+    index, slave = locate(bodies, joint.slave, where=f"joint {joint.name}", surface=True)
     return joint.stiffness * default_penalty(bodies[index], bodies[index].mesh.surface(slave))
 
 
 def _joined(
     bodies: Sequence[Body], offsets: IntArray, points: FloatArray, joint: Pair | Tie, law: ContactLaw
 ) -> Contact:
-    s, slave = locate(bodies, joint.slave)
-    m, master = locate(bodies, joint.master)
+    where = f"joint {joint.name}"
+    s, slave = locate(bodies, joint.slave, where=where, surface=True)
+    m, master = locate(bodies, joint.master, where=where, surface=True)
     return contact_pair(
         joint.name,
         points,

@@ -1,4 +1,4 @@
-"""Dead loads: pressures, tractions, forces on surfaces, lines and points, and gravity."""
+"""Loads: pressures, tractions, forces on surfaces, lines and points, and gravity; all but one are dead."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from fem.body import Body, locate
 from fem.errors import FemInputError
 from fem.finite_values import finite_number, finite_vector
 from fem.locate_point import cell_of_point
+from fem.names import nearest
 from fem.pairing import surface_points
 
 Vector = tuple[float, float, float]
@@ -29,6 +30,15 @@ class Clamp:
 @dataclass(frozen=True)
 class Pressure:
     """A dead pressure in Pa against the outward normals of the undeformed surface."""
+
+    name: str
+    surface: str
+    pressure: float
+
+
+@dataclass(frozen=True)
+class FollowerPressure:
+    """A pressure in Pa against the outward normals of the surface as it deforms: it turns and stretches with it."""
 
     name: str
     surface: str
@@ -78,7 +88,8 @@ class Gravity:
     bodies: tuple[str, ...] = ()
 
 
-Load = Clamp | Pressure | Traction | Force | PointForce | Gravity
+DeadLoad = Clamp | Pressure | Traction | Force | PointForce | Gravity
+Load = DeadLoad | FollowerPressure
 
 
 @dataclass(frozen=True)
@@ -96,15 +107,19 @@ def load_vector(load: Load, assembly: Assembly) -> FloatArray:
 
     Raises
     ------
-    FemInputError : unknown names, a point outside all bodies or on several, numbers that are not finite.
+    FemInputError : unknown names, a point outside all bodies or on several, numbers that are not finite, a follower
+        pressure.
     """
+    if isinstance(load, FollowerPressure):
+        advice = "give it to build_model, or use Pressure"
+        raise FemInputError("a pressure that follows has no dead force", where=f"load {load.name}", advice=advice)
     nodal = _nodal(load, assembly)
     if not np.isfinite(nodal).all():
         raise FemInputError("the load is not finite", where=f"load {load.name}", advice="check its numbers")
     return np.asarray(nodal).ravel()
 
 
-def _nodal(load: Load, assembly: Assembly) -> FloatArray:
+def _nodal(load: DeadLoad, assembly: Assembly) -> FloatArray:
     where = f"load {load.name}"
     if isinstance(load, Clamp | Pressure):
         return _pressure(load, assembly)
@@ -115,17 +130,17 @@ def _nodal(load: Load, assembly: Assembly) -> FloatArray:
         nodal = np.zeros((len(assembly.points), 3))
         nodal[found.nodes] = np.outer(found.shape, finite_vector(load.force, "the load", where=where))
         return nodal
-    share = nodal_share(assembly, load.region)
+    share = nodal_share(assembly, load.region, where=where)
     if isinstance(load, Force):
         return np.outer(share / share.sum(), finite_vector(load.total, "the load", where=where))
-    if not _extended(assembly, load.region):
+    if not _extended(assembly, load.region, where):
         advice = "use Force for single points"
         raise FemInputError("neither a surface nor a line", where=where, value=load.region, advice=advice)
     return np.outer(share, finite_vector(load.density, "the load", where=where))
 
 
 def _pressure(load: Clamp | Pressure, assembly: Assembly) -> FloatArray:
-    index, surface = locate(assembly.bodies, load.surface)
+    index, surface = locate(assembly.bodies, load.surface, where=f"load {load.name}", surface=True)
     facets = assembly.bodies[index].mesh.surface(surface) + assembly.offsets[index]
     at = surface_points(assembly.points, facets)
     given = load.pressure if isinstance(load, Pressure) else load.total_force
@@ -142,7 +157,7 @@ def _gravity(load: Gravity, assembly: Assembly) -> FloatArray:
     acceleration = finite_vector(load.acceleration, "the acceleration", where=f"load {load.name}")
     for name in load.bodies:
         if name not in names:
-            advice = f"bodies are {', '.join(names)}"
+            advice = nearest(name, names, "bodies are")
             raise FemInputError("unknown body", where=f"load {load.name}", value=name, advice=advice)
     force = (assembly.mass @ np.tile(acceleration, len(assembly.points))).reshape(-1, 3)
     for body, offset in zip(assembly.bodies, assembly.offsets, strict=True):
@@ -151,17 +166,17 @@ def _gravity(load: Gravity, assembly: Assembly) -> FloatArray:
     return np.asarray(force)
 
 
-def nodal_share(assembly: Assembly, name: str) -> FloatArray:
+def nodal_share(assembly: Assembly, name: str, *, where: str) -> FloatArray:
     """int N dA on a surface (m^2), int N ds on a line (m), or 1 at each other node: (n_node,)."""
-    index, region = locate(assembly.bodies, name)
+    index, region = locate(assembly.bodies, name, where=where)
     mesh, offset = assembly.bodies[index].mesh, assembly.offsets[index]
     share = np.zeros(len(assembly.points))
     if region in mesh.surfaces or region == "skin":
         at = surface_points(assembly.points, mesh.surface(region) + offset)
         np.add.at(share, at.nodes, at.shape * at.area[:, None])
         return share
-    nodes = mesh.nodes(region)
-    edges = _line(assembly, name)
+    nodes = mesh.nodes(region, where=where)
+    edges = _line(assembly, name, where)
     if len(edges) == 0:
         share[nodes + offset] = 1.0
         return share
@@ -174,9 +189,9 @@ def nodal_share(assembly: Assembly, name: str) -> FloatArray:
     return share
 
 
-def _line(assembly: Assembly, name: str) -> IntArray:
+def _line(assembly: Assembly, name: str, where: str) -> IntArray:
     """Edges (n_edge, 3) of cells whose nodes all belong to the set; empty if they do not cover it."""
-    index, region = locate(assembly.bodies, name)
+    index, region = locate(assembly.bodies, name, where=where)
     mesh = assembly.bodies[index].mesh
     nodes, edges = mesh.nodes(region), mesh.edges()
     edges = edges[np.isin(edges, nodes).all(axis=1)]
@@ -185,6 +200,6 @@ def _line(assembly: Assembly, name: str) -> IntArray:
     return edges if covered and 2 * len(edges) <= len(nodes) else edges[:0]
 
 
-def _extended(assembly: Assembly, name: str) -> bool:
-    index, region = locate(assembly.bodies, name)
-    return region in assembly.bodies[index].mesh.surfaces or region == "skin" or len(_line(assembly, name)) > 0
+def _extended(assembly: Assembly, name: str, where: str) -> bool:
+    index, region = locate(assembly.bodies, name, where=where)
+    return region in assembly.bodies[index].mesh.surfaces or region == "skin" or len(_line(assembly, name, where)) > 0

@@ -12,6 +12,7 @@ from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.element import reference_element
 from fem.errors import FemInputError
 from fem.finite_values import as_numbers
+from fem.names import nearest
 
 SKIN = "skin"
 """Every mesh has this surface: all its outer faces."""
@@ -66,27 +67,28 @@ class Mesh:
             return self.surfaces[name]
         if name == SKIN:
             return self.skin()
-        known = ", ".join(sorted(self.surfaces))
-        raise FemInputError("unknown surface", where="mesh", value=name, advice=f"known surfaces: {known}")
+        raise FemInputError(
+            "unknown surface", where="mesh", value=name, advice=nearest(name, self.surfaces, "known surfaces:")
+        )
 
-    def nodes(self, name: str) -> IntArray:
+    def nodes(self, name: str, *, where: str = "mesh") -> IntArray:
         """Nodes of a node set or surface; "a&b" are the nodes that both have, such as the edge of two faces.
 
-        An unknown name or an empty intersection raises ``FemInputError``.
+        An unknown name or an empty intersection raises ``FemInputError``; ``where`` says who asks.
         """
         found: IntArray | None = None
-        for part in name.split("&"):
+        for part in [name] if name in {*self.surfaces, *self.node_sets} else name.split("&"):
             here = self.node_sets[part] if part in self.node_sets else np.unique(self._known_surface(part))
             found = here if found is None else np.intersect1d(found, here)
         if found is None or len(found) == 0:
-            raise FemInputError("no node belongs to this set", where="mesh", value=name)
+            raise FemInputError("no node belongs to this set", where=where, value=name)
         return np.asarray(found)
 
     def _known_surface(self, name: str) -> IntArray:
         if name in self.surfaces or name == SKIN:
             return self.surface(name)
-        known = ", ".join(sorted({*self.surfaces, *self.node_sets}))
-        raise FemInputError("unknown surface or node set", where="mesh", value=name, advice=f"known surfaces: {known}")
+        advice = nearest(name, [*self.surfaces, *self.node_sets], "known surfaces:")
+        raise FemInputError("unknown surface or node set", where="mesh", value=name, advice=advice)
 
     def edges(self) -> IntArray:
         """All edges of all cells once, (n_edge, 3): two ends and the node between them."""

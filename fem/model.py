@@ -14,8 +14,21 @@ from fem.body import Body, locate
 from fem.bolt import Bolt, BoltSet, bolt_set, cut_bolts
 from fem.contact import Contact, join
 from fem.errors import FemInputError
+from fem.follower import FollowerSet, follower_set
 from fem.interfaces import Pair, Tie, bond_stiffness, default_penalty, pair_contact, tie_bond
-from fem.loads import Assembly, Clamp, Force, Gravity, Load, PointForce, Pressure, Traction, load_vector
+from fem.loads import (
+    Assembly,
+    Clamp,
+    FollowerPressure,
+    Force,
+    Gravity,
+    Load,
+    PointForce,
+    Pressure,
+    Traction,
+    load_vector,
+)
+from fem.names import unlike
 from fem.sparse_product import SparseProduct
 from fem.springs import (
     Elastic,
@@ -34,6 +47,7 @@ __all__ = [
     "Body",
     "Bolt",
     "Clamp",
+    "FollowerPressure",
     "Force",
     "Foundation",
     "Gravity",
@@ -66,6 +80,7 @@ class Model:
     load : (n_dof,) N, sum of clamps and other loads at load factor 1; loads : (n_load, n_dof) each one, clamps first.
     ties, bonds : bonded surfaces, then the sections of bolts, and their points; bolts : see ``BoltSet``.
     springs : springs and foundations, part of ``stiffness``; point_masses : part of ``mass``.
+    followers : pressures that turn with their surfaces; they count among the internal forces, not in ``load``.
     """
 
     bodies: tuple[Body, ...]
@@ -87,24 +102,34 @@ class Model:
     bolts: BoltSet
     springs: SpringSet
     point_masses: tuple[PointMass, ...]
+    followers: FollowerSet
 
     @property
     def n_dof(self) -> int:
         """Number of degrees of freedom, supports included."""
         return len(self.free)
 
+    def following(self, share: float) -> Model:
+        """The model with a share of its follower pressures acting, 1 for all of each."""
+        return self if share == self.followers.factor else replace(self, followers=self.followers.scaled(share))
+
     def facets(self, name: str) -> IntArray:
         """Global node numbers of the facets of surface "<body>.<surface>"."""
-        index, surface = locate(self.bodies, name)
+        index, surface = locate(self.bodies, name, where="facets", surface=True)
         return np.asarray(self.bodies[index].mesh.surface(surface) + self.offsets[index])
 
     def elastic_force(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Internal force of all bodies (n_dof, n_case) N and their strain energy (n_case,) J at u (n_dof, n_case) m."""
+        """Internal force of all bodies (n_dof, n_case) N and their strain energy (n_case,) J at u (n_dof, n_case) m.
+
+        Follower pressures are taken off the force.
+        """
         force = SparseProduct(self.stiffness)(u)
         energy = 0.5 * np.einsum("nc,nc->c", u, force)
         for cells in self.nonlinear:
             f, e = cells.internal_force(u)
             force, energy = force + f, energy + e
+        if self.followers.any:
+            force = force - self.followers.force(u)
         return force, energy
 
     def body_forces(self, u: FloatArray, v: FloatArray, beta: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -117,20 +142,29 @@ class Model:
         return elastic + linear, viscous, energy + 0.5 * np.einsum("nc,nc->c", u, linear)
 
     def cell_forces(self, u: FloatArray, v: FloatArray, beta: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The part of ``body_forces`` that belongs to the Green-Lagrange bodies."""
+        """The part of ``body_forces`` that belongs to the Green-Lagrange bodies, less follower pressures."""
         if not self.nonlinear:
-            return np.zeros_like(u), np.zeros_like(u), np.zeros(u.shape[1])
-        elastic, viscous, energy = self.nonlinear[0].forces(u, v, beta)
+            elastic, viscous, energy = np.zeros_like(u), np.zeros_like(u), np.zeros(u.shape[1])
+        else:
+            elastic, viscous, energy = self.nonlinear[0].forces(u, v, beta)
         for cells in self.nonlinear[1:]:
             f, g, e = cells.forces(u, v, beta)
             elastic, viscous, energy = elastic + f, viscous + g, energy + e
+        if self.followers.any:
+            elastic = elastic - self.followers.force(u)
         return elastic, viscous, energy
 
     def elastic_tangent(self, u: FloatArray, *, geometric: bool = True) -> sp.csr_matrix:
-        """Tangent of all bodies at u (n_dof,), N/m; without stress stiffening it is what beta multiplies in damping."""
+        """Tangent of all bodies at u (n_dof,), N/m; without stress stiffening it is what beta multiplies in damping.
+
+        With stress stiffening it holds the load stiffness of follower pressures, unsymmetric where they have no
+        potential.
+        """
         tangent = self.stiffness
         for cells in self.nonlinear:
             tangent = tangent + cells.assemble(cells.element_tangents(np.ascontiguousarray(u), geometric=geometric))
+        if geometric and self.followers.any:
+            tangent = tangent - self.followers.stiffness(u)
         return tangent.tocsr()
 
     def constrain(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
@@ -169,6 +203,7 @@ def build_model(
     Unknown names, inverted cells, interfaces without partners and numbers that are not finite raise ``FemInputError``.
     """
     _check_names(bodies)
+    unlike([*(p.name for p in pairs), *(t.name for t in ties), *(b.name for b in bolts)], "joints")
     bodies, sections = cut_bolts(bodies, bolts)
     offsets = np.concatenate([[0], np.cumsum([len(body.mesh.points) for body in bodies])[:-1]]).astype(np.int64)
     points = np.vstack([body.mesh.points for body in bodies])
@@ -182,7 +217,8 @@ def build_model(
     elastic = spring_set(springs, assembly)
     mass = mass + point_mass_matrix(point_masses, assembly)
     assembly = replace(assembly, mass=mass)
-    vectors = np.array([load_vector(load, assembly) for load in (*clamps, *loads)]).reshape(-1, 3 * n_node)
+    dead = (*clamps, *(load for load in loads if not isinstance(load, FollowerPressure)))
+    vectors = np.array([load_vector(load, assembly) for load in dead]).reshape(-1, 3 * n_node)
     free, prescribed = held(bodies, offsets, n_node, supports)
     return Model(
         bodies,
@@ -204,6 +240,7 @@ def build_model(
         bolt_set(bolts, bonds[len(bonds) - len(sections) :], 3 * n_node),
         elastic,
         tuple(point_masses),
+        follower_set(loads, bodies, offsets, points),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,10 +15,13 @@ from fem.finite_values import finite_array
 from fem.linear_solver import make_solver
 from fem.model import Model
 from fem.preload import StaticState
-from fem.rigid_motion import check_restraint
+from fem.rigid_motion import check_closed, check_restraint
 
 _RIGID = 1e-6
 """Eigenvalues above minus this share of the shift are those of rigid motions: roundoff of a stiffness that is zero."""
+
+_TOUCHING = 1e-13
+"""Gap over the largest coordinate that counts as none: a few hundred units of rounding."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,17 @@ class Rayleigh:
 
 
 def rest_state(model: Model) -> StaticState:
-    """The undeformed, unloaded structure as an equilibrium to linearise about; free bodies have no other."""
-    u = np.zeros((model.n_dof, 1))
-    contact = model.contact.evaluate(model.contact.relative(u), model.contact.no_slip(1))
-    return StaticState(u[:, 0], contact, (), ())
+    """The undeformed, unloaded structure as an equilibrium to linearise about; free bodies have no other.
+
+    Contact is open here where surfaces just touch, and closed where they overlap: what only contact holds is loose.
+    """
+    u, contact = np.zeros((model.n_dof, 1)), model.contact
+    found = contact.evaluate(contact.relative(u), contact.no_slip(1))
+    # Of surfaces that just touch, rounding would leave some points closed and others open.
+    touching = np.abs(contact.initial_gap) <= _TOUCHING * np.abs(model.points).max()
+    status = np.where(touching[:, None], 0, found.status)
+    traction = np.where(np.repeat(touching, 3)[:, None], 0.0, found.traction)
+    return StaticState(u[:, 0], replace(found, status=status, traction=traction), (), ())
 
 
 def solve_modes(
@@ -68,13 +78,17 @@ def solve_modes(
     Closed points are stuck (k_n, k_t), open points carry nothing. The shift at 0 needs stiffness: a body that nothing
     holds raises ``FemInputError``, an unstable equilibrium ``FemConvergenceError``. With a positive shift, of the order
     of the lowest elastic frequency, free bodies are allowed: their rigid modes come out with omega = 0 within roundoff.
+    Of the load stiffness of follower pressures the symmetric part is taken: all of it where they have a potential.
     """
     state.check_belongs(model)
     require_count("modes", "count", count, 1, most=int(model.free.sum()) - 1)
     require("modes", "shift_hz", shift_hz, 0.0)
     if shift_hz == 0.0:
         check_restraint(model)
-    elastic = model.elastic_tangent(state.u)
+        check_closed(model, state.contact.status[:, 0], "modes")
+    elastic = model.following(state.follower).elastic_tangent(state.u)
+    if model.followers.any:
+        elastic = (0.5 * (elastic + elastic.T)).tocsr()
     tangent = model.constrain(elastic + model.contact.stick_tangent(state.contact.status[:, 0]))
     keep = sp.diags(model.free.astype(float))
     mass = (keep @ model.mass @ keep).tocsr()
@@ -82,15 +96,16 @@ def solve_modes(
     shifted = tangent if sigma == 0.0 else (tangent - sigma * mass).tocsr()
     direct = make_solver(solver, symmetric=True)
     direct.analyse(shifted)
-    direct.factor(shifted)
+    try:
+        direct.factor(shifted)
+    except FemConvergenceError as error:
+        raise _unstable(str(error)) from error
     operator = spla.LinearOperator(tangent.shape, matvec=direct.solve, dtype=np.float64)
     # Supported rows have stiffness 1 and mass 0: infinite eigenvalues, which shift-invert never meets.
     start = np.where(model.free, np.sin(1.0 + np.arange(model.n_dof)), 0.0)
     values, shapes = spla.eigsh(tangent, count, mass, sigma=sigma, OPinv=operator, v0=start)
     if np.any(values <= -_RIGID * abs(sigma)):
-        raise FemConvergenceError(
-            "the tangent is not positive definite", where="modes", value=float(values.min()), advice="check the preload"
-        )
+        raise _unstable(f"omega^2 = {values.min():.4g} 1/s^2")
     values = np.maximum(values, 0.0)
     order = np.argsort(values)
     shapes = shapes[:, order]
@@ -99,6 +114,12 @@ def solve_modes(
     material = model.elastic_tangent(state.u, geometric=False)
     omega = np.sqrt(values[order])
     return ModalBasis(omega, np.ascontiguousarray(shapes), np.asarray(mass @ shapes), elastic, material)
+
+
+def _unstable(value: str) -> FemConvergenceError:
+    what = "the tangent is not positive definite"
+    advice = "this equilibrium is unstable, buckled or past a limit point: see unstable_directions, check the preload"
+    return FemConvergenceError(what, where="modes", value=value, advice=advice)
 
 
 def no_modes(model: Model, state: StaticState) -> ModalBasis:

@@ -107,14 +107,16 @@ class StepRecord:
     """What is known at one output: the state, its contact, energies (3, n_case) J and the effort since the last one.
 
     ``energies`` are kinetic, strain and contact. ``net_force`` (n_dof, n_case) = p - f - C v at this time: the inertia
-    force of the semi-discrete system there (the a of the scheme itself lags by (am - af) h). ``resume`` is where to
-    march on: ``state`` itself, or the beginning of the step inside which this output lies.
+    force of the semi-discrete system there (the a of the scheme itself lags by (am - af) h). ``support_force`` (n_held,
+    n_case) N acts on the held degrees of freedom, see ``SupportForces``. ``resume`` is where to march on: ``state``
+    itself, or the beginning of the step inside which this output lies.
     """
 
     state: MotionState
     contact: ContactState
     energies: FloatArray
     net_force: FloatArray
+    support_force: FloatArray
     effort: Effort
     resume: MotionState
 

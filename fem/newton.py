@@ -228,11 +228,11 @@ class LoadStep:
         pull = np.where(self.model.free, bolts.pull, 0.0)
         solution = solver.solve(np.column_stack([right, pull.T]))
         compliance = np.diag(bolts.stiffness) - bolts.pull @ solution[:, 1:]
-        self._check_tightened(compliance)
+        self._check_tightened(compliance, point.contact)
         dd = np.linalg.solve(compliance, point.bolt_residual - bolts.pull @ solution[:, 0])
         return np.asarray(solution[:, 0] - solution[:, 1:] @ dd), np.asarray(dd)
 
-    def _check_tightened(self, response: FloatArray) -> None:
+    def _check_tightened(self, response: FloatArray, contact: ContactState) -> None:
         """Refuse bolts whose force does not answer to their shortening, by d F / d delta (n_bolt, n_bolt) N/m."""
         bolts = self.model.bolts
         share = response / np.sqrt(np.outer(bolts.stiffness, bolts.stiffness))
@@ -240,6 +240,9 @@ class LoadStep:
             return
         slack = [bolt.name for bolt, own in zip(bolts.bolts, np.abs(np.diag(share)), strict=True) if own <= _SLACK]
         names = ", ".join(slack or [bolt.name for bolt in bolts.bolts])
+        if (contact.status == 0).any() and (contact.status > 0).any():
+            # An iterate on the way whose contact has opened says nothing about the model: a smaller step may hold.
+            raise FemConvergenceError("contact that a bolt presses opens on the way", where=f"bolt {names}")
         advice = "let both its ends press on parts, or hold its far end"
         raise FemInputError("nothing holds against tightening", where=f"bolt {names}", advice=advice)
 

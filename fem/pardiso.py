@@ -27,7 +27,7 @@ os.environ.setdefault("KMP_BLOCKTIME", "0")
 # run made twice, give the same bits (conditional numerical reproducibility of MKL, same machine and thread count).
 os.environ.setdefault("MKL_CBWR", "AUTO")
 
-_SPD, _UNSYMMETRIC = 2, 11
+_SPD, _INDEFINITE, _UNSYMMETRIC = 2, -2, 11
 _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
 _LOOSE = ("matrix is singular or indefinite", "look for an unconstrained or loose body")
 _FAILURES = {-2: ("not enough memory", "use a coarser mesh"), -4: _LOOSE, -7: _LOOSE}
@@ -42,12 +42,15 @@ class Pardiso:
 
     name = "pardiso"
 
-    def __init__(self, *, symmetric: bool, single: bool = False) -> None:
-        self._mtype = _SPD if symmetric else _UNSYMMETRIC
+    def __init__(self, *, symmetric: bool, single: bool = False, definite: bool = True) -> None:
+        self._mtype = (_SPD if definite else _INDEFINITE) if symmetric else _UNSYMMETRIC
         self._dtype: Any = np.float32 if single else np.float64
         self._handle = _Handle(load_mkl(), self._mtype)
         self._handle.iparm[27] = int(single)
-        if symmetric:
+        if symmetric and not definite:
+            # Pivots of 1 x 1 and 2 x 2 by Bunch and Kaufman: their signs are those of the eigenvalues.
+            self._handle.iparm[20] = 1
+        elif symmetric:
             # Two-level factorisation: without it, MKL's reproducible mode solves one right-hand side on one thread.
             self._handle.iparm[23] = 1
         else:
@@ -83,8 +86,13 @@ class Pardiso:
         memory = 1024 * int(max(iparm[14], iparm[15] + iparm[16]))
         return SolverStatistics(self.name, int(iparm[17]), memory, self._solves, **self._seconds)
 
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues of the matrix factored last; symmetric, indefinite matrices only."""
+        return int(self._handle.iparm[22])
+
     def _store(self, matrix: sp.csr_matrix) -> None:
-        stored = sp.triu(matrix, format="csr") if self._mtype == _SPD else matrix.tocsr()
+        stored = sp.triu(matrix, format="csr") if self._mtype != _UNSYMMETRIC else matrix.tocsr()
         stored.sort_indices()
         indptr, indices = stored.indptr.astype(np.int32), stored.indices.astype(np.int32)
         self._matrix = sp.csr_matrix((stored.data.astype(self._dtype), indices, indptr), shape=stored.shape)

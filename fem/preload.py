@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.arrays import FloatArray
+from fem.bolt import warn_of_slack
 from fem.bounds import require, require_count
 from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
@@ -36,6 +37,7 @@ class StaticState:
     load_factors : converged load factors; residuals : relative residual of every iteration of every step.
     dissipated : (n_point,) work of friction on the way, J/m^2, second order in the load steps (``friction_work``); None
         where it was not kept.
+    follower : share of the follower pressures of the model that acts here.
     """
 
     u: FloatArray
@@ -43,6 +45,7 @@ class StaticState:
     load_factors: tuple[float, ...]
     residuals: tuple[float, ...]
     dissipated: FloatArray | None = None
+    follower: float = 0.0
 
     def check_belongs(self, model: Model) -> None:
         """Raise ``FemInputError`` where this is no state of the model: other nodes or contact points."""
@@ -89,12 +92,14 @@ def solve_static(
 ) -> StaticState:
     """Load-stepped Newton with line search: f_int(u) + f_contact(u, slip) = load, u = prescribed where a support holds.
 
-    Bolts keep the shortening at which they are locked, none in a new model: ``solve_preload`` tightens them.
+    Bolts keep the shortening at which they are locked, none in a new model, which a ``PreloadWarning`` says:
+    ``solve_preload`` tightens them.
 
     Parameters
     ----------
     load : (n_dof,) N at the end; the steps go from the load that ``start`` carries (none: zero) to it, and from its
-        displacement of the supports to the prescribed one.
+        displacement of the supports to the prescribed one. Follower pressures go to those of the model, see
+        ``Model.following``, and turn with the surface in every iteration.
     start : equilibrium to start from, with its slip history.
 
     Raises
@@ -104,6 +109,7 @@ def solve_static(
 
     Issues ``SlidingWarning`` and ``ReachWarning``.
     """
+    warn_of_slack(model.bolts, "static solution")
     return _Loading(model, load, settings, start, tightened=False).run(progress)[0]
 
 
@@ -152,18 +158,21 @@ class _Loading:
         load = nodal_load(model, load)
         if start is not None:
             start.check_belongs(model)
+        self._share = 0.0 if start is None else start.follower
+        carried, followers = model.following(self._share), model.followers
         self._model, self._load, self._settings, self._tightened = model, load, settings, tightened
         self._fresh = start is None
         self._u = np.zeros(model.n_dof) if start is None else start.u
         self._begin = self._u
         slip = model.contact.no_slip(1) if start is None else start.contact.slip
-        self._first, self._contact = internal_force(model, self._u, slip)
+        self._first, self._contact = internal_force(carried, self._u, slip)
         if start is None:
             self._first = np.zeros(model.n_dof)
         self._shortening = model.bolts.shortening
         wanted = model.bolts.wanted if tightened else np.zeros(0)
         # Not the change alone: a start that is already in balance would ask for a residual below roundoff.
-        sizes = [float(np.linalg.norm(force[model.free])) for force in (load, self._first)]
+        pressed = followers.force(self._u[:, None])[:, 0] if followers.any else np.zeros(model.n_dof)
+        sizes = [float(np.linalg.norm(force[model.free])) for force in (load, self._first, pressed)]
         scale = max(*sizes, float(np.linalg.norm(wanted))) or 1.0
         self._tolerance = Tolerance(settings.tolerance, scale, settings.max_iterations, settings.solver)
         self._dissipated = np.zeros(model.contact.n_point)
@@ -208,14 +217,17 @@ class _Loading:
             touching=self._fresh and old == 0.0,
         )
         slip = self._contact.slip
-        found = LoadStep(model, target, slip, self._tolerance).solve(self._u, self._shortening)
+        share = self._share + new * (model.followers.factor - self._share)
+        found = LoadStep(model.following(share), target, slip, self._tolerance).solve(self._u, self._shortening)
         relative = (model.contact.relative(self._u[:, None]), model.contact.relative(found.u[:, None]))
         self._dissipated += friction_work(model.contact, relative, (self._contact, found.contact))
         self._u, self._shortening, self._contact = found.u, found.shortening, found.contact
 
     def _state(self) -> StaticState:
         history = tuple(self._tolerance.history)
-        return StaticState(self._u, self._contact, tuple(self._factors), history, self._dissipated.copy())
+        reached, share = self._factors[-1] if self._factors else 0.0, self._share
+        share += reached * (self._model.followers.factor - share)
+        return StaticState(self._u, self._contact, tuple(self._factors), history, self._dissipated.copy(), share)
 
     def _advice(self, contact: object) -> str:
         """What the last iterate says about the failure: a part that all its closed points let slide, or nothing."""

@@ -38,8 +38,9 @@ def reaction_moment(
 
 def _nodal(model: Model, state: StaticState, region: str, load_factor: float) -> tuple[IntArray, FloatArray]:
     """Nodes (n,) of a region and the forces (n, 3) in N of the supports on them."""
-    index, name = locate(model.bodies, region)
-    nodes = model.bodies[index].mesh.nodes(name) + model.offsets[index]
-    force, _ = internal_force(model, state.u, state.contact.slip)
+    where = f"reaction of {region}"
+    index, name = locate(model.bodies, region, where=where)
+    nodes = model.bodies[index].mesh.nodes(name, where=where) + model.offsets[index]
+    force, _ = internal_force(model.following(state.follower), state.u, state.contact.slip)
     carried = np.where(model.free, 0.0, force - load_factor * model.load)
     return nodes, np.asarray(carried.reshape(-1, 3)[nodes])

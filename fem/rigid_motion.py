@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from fem.arrays import BoolArray, FloatArray
+import numpy as np
+import scipy.sparse as sp
+
+from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.errors import FemInputError
 from fem.model import Model
 
@@ -12,34 +15,76 @@ _TOLERANCE = 1e-8
 """Singular value of the restraints, relative to the largest, below which a rigid motion counts as free."""
 
 
-def rigid_motions(model: Model) -> FloatArray:
-    """Three translations and three rotations (about the centre, unit largest displacement) per body, (n_dof, 6 n_body).
+@dataclass(frozen=True)
+class Part:
+    """Cells of a body that hang together: nearly always all of them. ``nodes`` (n,) are numbers in the model."""
 
-    m per m: columns 6 b + (0, 1, 2) translate body b along x, y, z; 6 b + (3, 4, 5) rotate it about x, y, z.
+    name: str
+    nodes: IntArray
+
+
+def parts(model: Model) -> tuple[Part, ...]:
+    """All parts of all bodies; where a body falls into several they are named by their number and place."""
+    found = []
+    for body, offset in zip(model.bodies, model.offsets, strict=True):
+        mesh, n = body.mesh, len(body.mesh.points)
+        others = mesh.cells[:, 1:]
+        ends = np.repeat(mesh.cells[:, 0], others.shape[1]), others.ravel()
+        graph = sp.csr_matrix((np.ones(len(ends[0]), dtype=bool), ends), shape=(n, n))
+        count, label = sp.csgraph.connected_components(graph, directed=False)
+        for number in range(count):
+            nodes = np.flatnonzero(label == number)
+            x, y, z = mesh.points[nodes].mean(axis=0)
+            place = f", part {number + 1} of {count} around ({x:.4g}, {y:.4g}, {z:.4g}) m"
+            found.append(Part(body.name + (place if count > 1 else ""), nodes + int(offset)))
+    return tuple(found)
+
+
+def rigid_motions(model: Model) -> FloatArray:
+    """Three translations and three rotations (about the centre, unit largest displacement) per part, (n_dof, 6 n_part).
+
+    m per m: columns 6 b + (0, 1, 2) translate part b along x, y, z; 6 b + (3, 4, 5) rotate it about x, y, z. A body is
+    one part unless its cells do not hang together.
     """
-    motions = np.zeros((len(model.points), 3, len(model.bodies), 6))
-    for number, (body, offset) in enumerate(zip(model.bodies, model.offsets, strict=True)):
-        arm = body.mesh.points - body.mesh.points.mean(axis=0)
+    pieces = parts(model)
+    motions = np.zeros((len(model.points), 3, len(pieces), 6))
+    for number, part in enumerate(pieces):
+        arm = model.points[part.nodes] - model.points[part.nodes].mean(axis=0)
         arm = arm / np.linalg.norm(arm, axis=1).max()
-        rows = slice(int(offset), int(offset) + len(arm))
-        motions[rows, :, number, :3] = np.eye(3)
-        motions[rows, :, number, 3:] = np.cross(np.eye(3)[None], arm[:, None, :]).transpose(0, 2, 1)
+        motions[part.nodes, :, number, :3] = np.eye(3)
+        motions[part.nodes, :, number, 3:] = np.cross(np.eye(3)[None], arm[:, None, :]).transpose(0, 2, 1)
     return motions.reshape(model.n_dof, -1)
 
 
 def check_restraint(model: Model) -> None:
-    """Raise ``FemInputError`` that names a body which can move freely even with all interfaces closed."""
+    """Raise ``FemInputError`` that names a part which can move freely even with all interfaces closed."""
     share = loose_motion(model, np.ones(model.contact.n_point, dtype=bool))
     if share is None:
         return
+    where = loose_bodies(model, share)
     advice = "add a support, a spring, a tie or a contact that holds it"
-    raise FemInputError(
-        "nothing holds a part of the structure", where=loose_bodies(model, share), value=_words(share), advice=advice
-    )
+    if ", part " in where:
+        advice += "; parts of one body share no node: join coincident ones with merged"
+    raise FemInputError("nothing holds a part of the structure", where=where, value=_words(share), advice=advice)
+
+
+def check_closed(model: Model, status: IntArray, who: str) -> None:
+    """Raise ``FemInputError`` where contact that is open, by ``status`` (n_point,), leaves a part loose.
+
+    ``who`` linearises there: a Newton step from such a state has a singular matrix.
+    """
+    share = loose_motion(model, status > 0)
+    if share is None:
+        return
+    contact = model.contact
+    names = [name for n, name in enumerate(contact.names) if not (status[contact.pair == n] > 0).any()]
+    value = f"{loose_bodies(model, share)} {_words(share)}, contact {', '.join(names) or 'in part'} open"
+    advice = "give a state with this contact closed, as solve_static finds; at rest, surfaces that just touch are open"
+    raise FemInputError("open contact leaves a part loose in the given state", where=who, value=value, advice=advice)
 
 
 def loose_motion(model: Model, closed: BoolArray, sliding: BoolArray | None = None) -> FloatArray | None:
-    """A rigid motion (n_body, 6) that supports, springs, ties and the ``closed`` points (n_point,) let pass, or None.
+    """A rigid motion (n_part, 6) that supports, springs, ties and the ``closed`` points (n_point,) let pass, or None.
 
     Rank of the supported rows and of B R over the rigid motions R; points that have no friction, or are
     ``sliding`` (n_point,), resist along the normal only.
@@ -59,12 +104,12 @@ def loose_motion(model: Model, closed: BoolArray, sliding: BoolArray | None = No
 
 
 def loose_bodies(model: Model, share: FloatArray) -> str:
-    """Names of the bodies that move in a rigid motion (n_body, 6)."""
-    part = np.linalg.norm(share, axis=1)
-    return ", ".join(body.name for body, size in zip(model.bodies, part, strict=True) if size > 0.1 * part.max())
+    """Names of the parts that move in a rigid motion (n_part, 6)."""
+    size = np.linalg.norm(share, axis=1)
+    return ", ".join(part.name for part, own in zip(parts(model), size, strict=True) if own > 0.1 * size.max())
 
 
 def _words(share: FloatArray) -> str:
-    part = np.linalg.norm(share, axis=1)
-    kind, axis = divmod(int(np.abs(share[part.argmax()]).argmax()), 3)
+    size = np.linalg.norm(share, axis=1)
+    kind, axis = divmod(int(np.abs(share[size.argmax()]).argmax()), 3)
     return f"free to {('translate along', 'rotate about')[kind]} {'xyz'[axis]}"

@@ -18,6 +18,7 @@ from fem.finite_values import finite_number, finite_vector
 from fem.interfaces import default_penalty
 from fem.loads import Assembly, Vector
 from fem.locate_point import cell_of_point
+from fem.names import unlike
 from fem.pairing import surface_points
 
 RIGID = 1000.0
@@ -97,12 +98,24 @@ class SpringSet:
         pull = -(self.stiffness * (self.operator @ u))[:, None] * self.axes
         return {name: np.asarray(pull[self.owner == number].sum(axis=0)) for number, name in enumerate(self.names)}
 
+    def resultants(self) -> sp.csr_matrix:
+        """R (3 n_spring, n_dof) N/m: the forces at u are R u, three rows for each spring in order of ``names``."""
+        rows = (3 * self.owner[:, None] + np.arange(3)).ravel()
+        columns = np.repeat(np.arange(len(self.owner)), 3)
+        values = (-self.stiffness[:, None] * self.axes).ravel()
+        shape = (3 * len(self.names), len(self.owner))
+        return (sp.csr_matrix((values, (rows, columns)), shape=shape) @ self.operator).tocsr()
+
 
 Elastic = Foundation | Spring
 
 
 def spring_set(elastic: Sequence[Elastic], assembly: Assembly) -> SpringSet:
-    """Rows and stiffnesses; unknown names, points outside all bodies and negative numbers raise ``FemInputError``."""
+    """Rows and stiffnesses.
+
+    Unknown names, one name twice, points outside all bodies and negative numbers raise ``FemInputError``.
+    """
+    unlike([item.name for item in elastic], "springs")
     n_dof = 3 * len(assembly.points)
     rows, stiffness, axes = [sp.csr_matrix((0, n_dof))], [np.empty(0)], [np.empty((0, 3))]
     for item in elastic:
@@ -120,7 +133,7 @@ def spring_set(elastic: Sequence[Elastic], assembly: Assembly) -> SpringSet:
 
 def _bed(bed: Foundation, assembly: Assembly) -> tuple[sp.csr_matrix, FloatArray, FloatArray]:
     where = f"spring {bed.name}"
-    index, surface = locate(assembly.bodies, bed.surface)
+    index, surface = locate(assembly.bodies, bed.surface, where=where, surface=True)
     body, offset = assembly.bodies[index], assembly.offsets[index]
     facets = body.mesh.surface(surface)
     at = surface_points(assembly.points, facets + offset)

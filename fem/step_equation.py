@@ -153,7 +153,8 @@ class StepEquation:
             slip=solved.contact.slip,
             history=np.concatenate([u[None], old.history[: KEPT - 1]]),
         )
-        return self._record(old, new, (solved.strain, solved.contact), loads, Effort(solved.iterations, substeps=1))
+        record = self._record(old, new, (solved.strain, solved.contact), loads, a - old.a)
+        return replace(record, effort=Effort(solved.iterations, substeps=1))
 
     def between(
         self, old: MotionState, new: MotionState, share: float, loads: tuple[FloatArray, FloatArray]
@@ -185,7 +186,7 @@ class StepEquation:
             damping_v=damping_v,
             slip=contact.slip,
         )
-        return self._record(old, mid, (strain, contact), loads, Effort.none(u.shape[1]))
+        return self._record(old, mid, (strain, contact), loads, new.a - old.a)
 
     def _record(
         self,
@@ -193,15 +194,17 @@ class StepEquation:
         new: MotionState,
         found: tuple[FloatArray, ContactState],
         loads: tuple[FloatArray, FloatArray],
-        effort: Effort,
+        rise: FloatArray,
     ) -> StepRecord:
+        """The record of a state without the effort; ``rise`` (n_dof, n_case) is that of a over the whole step."""
         strain, contact = found
         new = replace(new, work=old.work + self._increment(old, new, contact, loads))
         # With the inertia of the dispersion correction: it makes up for what the velocities of the scheme overshoot.
         inertia_v = new.inertia_v + self.correct_inertia(new.v)
         energies = self.dynamics.energies(inertia_v, new, strain, contact)
         net = (loads[1] - new.force - new.viscous - new.damping_v) * self.dynamics.mask
-        return StepRecord(new, contact, energies, net, effort, new)
+        held = self.dynamics.support_force(new, self.scheme.timely(new.a, rise), loads[1])
+        return StepRecord(new, contact, energies, net, held, Effort.none(new.u.shape[1]), new)
 
     def _increment(
         self, old: MotionState, new: MotionState, contact: ContactState, loads: tuple[FloatArray, FloatArray]
@@ -216,5 +219,6 @@ class StepEquation:
         friction = self.dynamics.model.contact.dissipated(contact.traction, old.slip, contact.slip)
         load = (1.0 - af) * p_new + af * p_old
         damped, given = (np.einsum("nc,nc->c", force, new.u - old.u) for force in (damping, load))
+        given = given + self.dynamics.follower_work(old.u, new.u, 1.0 - af)
         given = given + self.dynamics.support_work(old, new, (self.scheme.alpha_m, af), load)
         return np.stack([friction, damped, given])

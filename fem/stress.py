@@ -16,6 +16,7 @@ from fem.finite_values import finite_array
 from fem.loads import Vector
 from fem.locate_point import cell_of_point
 from fem.model import Model
+from fem.names import nearest
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def integration_point_stress(model: Model, u: FloatArray, body: str) -> Stress:
     """
     names = [b.name for b in model.bodies]
     if body not in names:
-        raise FemInputError("unknown body", where="stress", value=body, advice=f"bodies are {', '.join(names)}")
+        raise FemInputError("unknown body", where="stress", value=body, advice=nearest(body, names, "bodies are"))
     index = names.index(body)
     return _at_points(model.bodies[index], _displacement(model, u, index))
 

@@ -48,13 +48,10 @@ def held(
     """
     free = np.ones((n_node, 3), dtype=bool)
     prescribed = np.zeros((n_node, 3))
+    points = np.vstack([body.mesh.points for body in bodies])
     for support in supports:
-        index, region = locate(bodies, support.surface)
-        mesh = bodies[index].mesh
-        local = mesh.nodes(region)
-        axes = [_axis(bodies[index], region, support, direction) for direction in support.directions]
-        values = _values(support, mesh.points[local], axes)
-        nodes = local + offsets[index]
+        nodes, axes = components(bodies, offsets, support)
+        values = _values(support, points[nodes], axes)
         for column, axis in enumerate(axes):
             given = ~free[nodes, axis]
             if np.any(given & (prescribed[nodes, axis] != values[:, column])):
@@ -68,12 +65,22 @@ def held(
     return free.ravel(), prescribed.ravel()
 
 
+def components(bodies: Sequence[Body], offsets: IntArray, support: Support) -> tuple[IntArray, list[int]]:
+    """Nodes (n,) that a support holds and the axes 0, 1, 2 along which it does; raises as ``held``."""
+    where = f"support {support.surface}"
+    index, region = locate(bodies, support.surface, where=where)
+    nodes = bodies[index].mesh.nodes(region, where=where) + offsets[index]
+    return nodes, [_axis(bodies[index], region, support, direction) for direction in support.directions]
+
+
 def _axis(body: Body, region: str, support: Support, direction: str) -> int:
     if direction in AXES:
         return AXES[direction]
     where = f"support {support.surface}"
     if direction != "normal":
         raise FemInputError("unknown direction", where=where, value=direction, advice="choose x, y, z or normal")
+    if region not in body.mesh.surfaces:
+        raise FemInputError("not a surface", where=where, value="normal", advice="name the axis of a line or a point")
     normals = surface_points(body.mesh.points, body.mesh.surface(region)).normals
     axis = int(np.abs(normals[0]).argmax())
     if np.any(np.abs(normals[:, axis]) < 1.0 - _ALIGNED):

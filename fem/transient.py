@@ -176,7 +176,9 @@ class Transient:
         net = (load - force - viscous - state.damping_v) * self.dynamics.mask
         inertia_v = state.inertia_v + self._equation(state.pace.last_level).correct_inertia(state.v)
         energies = self.dynamics.energies(inertia_v, state, strain, contact)
-        return StepRecord(state, contact, energies, net, Effort.none(n_case), state)
+        rise = self.settings.time_step * 2.0**-state.pace.last_level * state.pace.jerk
+        held = self.dynamics.support_force(state, self.scheme.timely(state.a, rise), load)
+        return StepRecord(state, contact, energies, net, held, Effort.none(n_case), state)
 
     def march(self, state: MotionState, n_step: int) -> Iterator[StepRecord]:
         """Yield ``n_step`` outputs from ``state``, one per ``time_step``.

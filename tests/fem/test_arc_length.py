@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
 
 from fem.arc_length import EquilibriumPath, PathSettings, follow_path
 from fem.block import graded, hex_block
@@ -12,6 +14,7 @@ from fem.material import Material
 from fem.mesh import within
 from fem.model import Body, Force, Model, Support, build_model
 from fem.preload import StaticSettings, solve_static
+from fem.stability import unstable_directions
 
 RISE, SPAN = 0.03, 1.0
 
@@ -89,3 +92,38 @@ def test_path_without_load_is_refused() -> None:
     model = _arch()
     with pytest.raises(FemConvergenceError, match="positive size"):
         follow_path(model, 0.0 * model.load)
+
+
+@pytest.mark.parametrize("share", [1e-3, 1e-6])
+def test_slender_column_follows_koiter_and_the_elastica(share: float) -> None:
+    """A clamped column of slenderness 690 with its first mode as imperfection a = share L, by default settings.
+
+    w = a lambda / (1 - lambda) as long as rotations are small, (P/P_E) = (2 K(k)/pi)^2 at w/L = 2 k/K(k) when the
+    imperfection no longer matters; twenty cells bend by 0.6 % too stiffly at w = L/2. It took 200 steps to w = L/10.
+    """
+    length, width, depth = 0.5, 0.01, 0.005
+    mesh = hex_block(
+        graded([0.0, length], [20]),
+        graded([0.0, width], [1]),
+        graded([-0.5 * depth, 0.5 * depth], [1]),
+        mapping=lambda p: (
+            p + np.outer(share * length * (1.0 - np.cos(0.5 * np.pi * p[:, 0] / length)), [0.0, 0.0, 1.0])
+        ),
+    )
+    model = build_model(
+        [Body("column", mesh, Material(2e11, 0.0, 7800.0))],
+        supports=[Support("column.x_min", ("x", "y", "z")), Support("column.y_min", ("y",))],
+        loads=[Force("push", "column.x_max", (-1.0, 0.0, 0.0))],
+    )
+    euler = np.pi**2 * 2e11 * width * depth**3 / 12.0 / (4.0 * length**2)
+    tip = 3 * model.bodies[0].mesh.nodes("x_max&z_max")[0] + 2
+    path = follow_path(model, 2.0 * euler * model.load, stop=lambda u, _: u[tip] > 0.5 * length)
+    w, load = path.displacements[:, tip] / length, 2.0 * path.load_factors
+    assert len(w) < 60
+    early = (load > 0.3) & (load < 0.9)
+    assert w[early] == pytest.approx(share * load[early] / (1.0 - load[early]), rel=0.05)
+    late = w > max(0.1, 100.0 * share)
+    k = np.array([brentq(lambda k, at=at: 2.0 * k / ellipk(k * k) - at, 1e-6, 0.95) for at in w[late]])
+    assert load[late] == pytest.approx((2.0 * ellipk(k * k) / np.pi) ** 2, rel=6e-3 + share / 0.1)
+    assert late.sum() >= 3
+    assert [unstable_directions(model, state) for state in path.states[::6]] == [0] * len(path.states[::6])

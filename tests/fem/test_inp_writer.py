@@ -9,6 +9,7 @@ import pytest
 
 from fem.errors import FemInputError
 from fem.inp_writer import nodal_loads, write_inp
+from fem.loads import FollowerPressure
 from fem.mesh import Mesh
 from fem.model import Body, Model, Pair, Support, Tie, build_model
 from fem.read_mesh import read_mesh
@@ -93,6 +94,9 @@ def test_what_calculix_has_no_counterpart_for_is_refused(tmp_path: Path) -> None
         write_inp(tmp_path / "hex27.inp", model)
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
     moved = build_model([Body("body", mesh, STEEL)], supports=[Support("body.x_min", ("x",), 1e-3)])
+    pressed = build_model([Body("body", mesh, STEEL)], loads=[FollowerPressure("p", "body.x_min", 1.0)])
+    with pytest.raises(FemInputError, match="follower pressures are not written"):
+        write_inp(tmp_path / "pressed.inp", pressed)
     with pytest.raises(FemInputError, match="only supports at rest"):
         write_inp(tmp_path / "moved.inp", moved)
     stressed = build_model([Body("body", mesh, STEEL, initial_stress=1e6 * np.eye(3))])

@@ -60,3 +60,28 @@ def test_reactions_balance_the_loads() -> None:
     left, right = (fem.reaction(model, state, f"beam.{name}") for name in ("x_min", "x_max"))
     np.testing.assert_allclose(left + right, [-50.0, 0.0, 9.81 * 7800.0 * 0.02], atol=1e-5)
     assert right[2] > 0.0
+
+
+def test_sides_of_one_name_are_united_only_where_they_are_one_side() -> None:
+    """A step: the tops lie in two planes and do not touch, so neither is z_max; the front is one plane."""
+    low = box((1.0, 0.4, 0.3), (2, 2, 1))
+    high = fem.hex_block([0.5, 1.0], [0.0, 0.2, 0.4], [0.3, 0.7])
+    step = fem.merged([low, high])
+    assert {"z_max_1", "z_max_2", "x_min_1", "x_min_2"} <= set(step.surfaces)
+    assert np.all(step.points[step.surface("z_max_2"), 2] == 0.7)
+    assert np.ptp(step.points[step.surface("z_max_1"), 2]) == 0.0
+    assert len(step.surface("x_max")) == len(step.surface("y_min")) + 1 == 4
+    with pytest.raises(FemInputError, match=r"unknown surface; got z_max; known surfaces: .*z_max_1, z_max_2"):
+        step.surface("z_max")
+    # Two feet in one plane are one side though they do not touch; merged once more, names go on.
+    feet = [fem.hex_block([x, x + 0.2], [0.0, 0.2], [-0.4, 0.0]) for x in (0.0, 0.8)]
+    table = fem.merged([fem.hex_block([0.0, 0.2, 0.8, 1.0], [0.0, 0.2], [0.0, 0.1]), *feet])
+    assert len(table.surface("z_min_2")) == 2
+    again = fem.merged([step, fem.hex_block([1.0, 1.5], [0.0, 0.2, 0.4], [0.0, 0.3])])
+    assert "z_max_2" in again.surfaces
+
+
+def test_surfaces_of_one_name_that_the_user_gave_are_united() -> None:
+    low = box((1.0, 0.4, 0.3), (2, 2, 1)).with_region("painted", fem.within(z=(0.3, 0.3), x=(0.0, 0.5)))
+    high = fem.hex_block([0.5, 1.0], [0.0, 0.2, 0.4], [0.3, 0.7]).with_region("painted", fem.within(z=(0.7, 0.7)))
+    assert len(fem.merged([low, high]).surface("painted")) == 4

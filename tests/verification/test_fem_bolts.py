@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,11 +10,13 @@ import pytest
 from fem.block import graded, hex_block
 from fem.bolt import Bolt
 from fem.equilibrium import interface_states
-from fem.errors import FemInputError
+from fem.errors import FemConvergenceError, FemInputError
 from fem.loads import Force
 from fem.material import Material
 from fem.mesh import Mesh
 from fem.model import Body, Model, Pair, Support, Tie, build_model
+from fem.modes import rest_state
+from fem.newton import LoadStep, Target, Tolerance
 from fem.preload import StaticSettings, StaticState, lock_bolts, solve_preload, solve_static
 from fem.tightening import bolt_force
 
@@ -171,3 +173,77 @@ def test_bolt_that_nothing_presses_back_is_refused() -> None:
     )
     with pytest.raises(FemInputError, match="bolt x: nothing holds against tightening"):
         solve_preload(model, StaticSettings())
+
+
+def _turned(direction: int) -> tuple[Model, np.ndarray]:
+    """A shank that presses two sleeves, turned by 40 and 25 degrees about two axes unless ``direction`` is 0."""
+    first, second = np.deg2rad([40.0, 25.0]) * abs(direction)
+    about_z = np.array([[np.cos(first), -np.sin(first), 0.0], [np.sin(first), np.cos(first), 0.0], [0.0, 0.0, 1.0]])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(second), -np.sin(second)], [0.0, np.sin(second), np.cos(second)]])
+    turn = about_x @ about_z
+
+    def placed(name: str, x: tuple[float, float], y: tuple[float, float], cells: tuple[int, int]) -> Body:
+        mesh = _block(x, y, cells)
+        return Body(name, Mesh(mesh.points @ turn.T, mesh.cells, mesh.element, mesh.surfaces), SOFT, "linear")
+
+    bodies = [
+        placed("base", (0.0, 3 * WIDTH), (-0.01, 0.0), (3, 1)),
+        placed("shank", (WIDTH, 2 * WIDTH), (0.0, LENGTH), (1, 4)),
+        placed("left", (0.0, WIDTH), (0.0, LENGTH), (1, 3)),
+        placed("right", (2 * WIDTH, 3 * WIDTH), (0.0, LENGTH), (1, 3)),
+        placed("head", (0.0, 3 * WIDTH), (LENGTH, LENGTH + 0.01), (3, 1)),
+    ]
+    seams = [("y_max", "head.y_min"), ("y_min", "base.y_max")]
+    model = build_model(
+        bodies,
+        pairs=[Pair(f"{n}_{s}", f"{n}.{s}", m, 0.2) for n in ("left", "right") for s, m in seams],
+        ties=[Tie("thread", "shank.y_min", "base.y_max"), Tie("neck", "shank.y_max", "head.y_min")],
+        bolts=[Bolt("bolt", "shank", F0, "y" if direction == 0 else tuple(3.0 * direction * turn[:, 1]))],
+        supports=[Support("base.y_min", ("x", "y", "z"))],
+    )
+    return model, turn
+
+
+def test_contact_that_opens_on_the_way_asks_for_a_smaller_step() -> None:
+    """An iterate whose contact is partly open was taken for a bolt that nothing holds, and the solution given up."""
+    model, _ = _turned(1)
+    target = Target(model.load, 0.0 * model.load, model.bolts.wanted, touching=False)
+    contact = rest_state(model).contact
+    step = LoadStep(model, target, contact.slip, Tolerance(1e-8, F0, 30, "superlu"))
+    partly = np.where(np.arange(model.contact.n_point)[:, None] % 2 == 0, 0, 1)
+    with pytest.raises(FemConvergenceError, match="contact that a bolt presses opens on the way"):
+        step._check_tightened(np.zeros((1, 1)), replace(contact, status=partly))
+    with pytest.raises(FemInputError, match="nothing holds against tightening"):
+        step._check_tightened(np.zeros((1, 1)), replace(contact, status=np.ones_like(partly)))
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_oblique_bolts_are_those_along_y_turned(direction: int) -> None:
+    """The turned displacement, shortening and forces, to the tolerance of 1e-10; the axis may point either way."""
+    settings = StaticSettings(steps=2, tolerance=1e-10, solver="superlu")
+    straight, _ = _turned(0)
+    locked, state = solve_preload(straight, settings)
+    oblique, turn = _turned(direction)
+    tight, turned = solve_preload(oblique, settings)
+    moved = turned.u.reshape(-1, 3) @ turn
+    # Nodes of the cut change sides with the axis: the parts around the shank are compared.
+    around = np.delete(np.arange(len(moved)), np.arange(oblique.offsets[1], oblique.offsets[2]))
+    np.testing.assert_allclose(moved[around], state.u.reshape(-1, 3)[around], atol=1e-8 * np.abs(state.u).max())
+    assert tight.bolts.forces(turned.u)[0] == pytest.approx(F0, rel=1e-9)
+    assert tight.bolts.shortening[0] == pytest.approx(locked.bolts.shortening[0], rel=1e-8)
+    here, there = (interface_states(m, s.u, s.contact)[0] for m, s in ((locked, state), (tight, turned)))
+    assert there.normal_force == pytest.approx(here.normal_force, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("axis", "message"),
+    [
+        ((0.0, 0.0, 0.0), "bolt b: the axis has no direction"),
+        ((1.0, 0.0), "bolt b: the axis has the wrong shape"),
+        ((1.0, np.nan, 0.0), "bolt b: the axis is not finite"),
+        ("w", r"unknown axis; got w; choose x, y, z or a direction"),
+    ],
+)
+def test_axes_that_point_nowhere_are_refused(axis: object, message: str) -> None:
+    with pytest.raises(FemInputError, match=message):
+        Bolt("b", "shank", F0, axis)
