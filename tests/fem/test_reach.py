@@ -106,11 +106,11 @@ def test_of_two_layers_the_nearer_one_is_the_partner() -> None:
     side = graded([0.0, 1.0], [3])
     decks = fem.merged([
         hex_block(side, graded([y, y + 0.01], [1]), side) for y in (-0.04, -0.01)
-    ])  # fmt: skip
+    ]).with_region("tops", lambda p: np.isin(p[:, 1].round(9), (-0.03, 0.0)))  # fmt: skip
     slab = hex_block(graded([-0.1, 1.1], [2]), graded([0.01, 0.1], [1]), graded([0.0, 1.0], [2]))
     model = fem.build_model(
         [fem.Body("lower", decks, STEEL), fem.Body("upper", slab, STEEL)],
-        pairs=[fem.Pair("joint", "upper.y_min", "lower.y_max", 0.3)],
+        pairs=[fem.Pair("joint", "upper.y_min", "lower.tops", 0.3)],
     )
     assert model.contact.area.sum() == pytest.approx(1.0, rel=1e-12)
     np.testing.assert_allclose(model.contact.initial_gap, 0.01, atol=1e-12)
