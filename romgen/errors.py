@@ -14,7 +14,7 @@ def _shown(value: object) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, tuple | list):
-        inside = ", ".join(map(_shown, value))
+        inside = ", ".join(repr(entry) if isinstance(entry, str) else _shown(entry) for entry in value)
         if isinstance(value, list):
             return f"[{inside}]"
         return f"({inside},)" if len(value) == 1 else f"({inside})"
