@@ -17,9 +17,9 @@ from romgen.arrays import FloatArray
 from romgen.errors import InputError
 from romgen.noise_floor import LineSpectrum, acceleration_noise, signal_end_hz
 
-# Noise in second differences relative to their signal above which they are smoothed. The linear fit is biased by its
-# square, 1e-4 of a frequency: a phase of 0.06 within 100 periods.
-SMOOTHED = 0.01
+# Noise in second differences relative to their signal above which they are smoothed: what differences of order 8 err by
+# themselves with seven samples in a period. Decimals with six digits reach it at 5 kHz for motions of 50 Hz.
+SMOOTHED = 1e-3
 # The low-pass ends here, in units of the last frequency that it passes: its length is 1/(STOP - 1) of that period, and
 # more noise passes the wider this is.
 STOP = 2.5
@@ -69,7 +69,7 @@ def low_pass(spectrum: LineSpectrum, step: float, largest: float) -> LowPass | N
         taps=taps / taps.sum(),
         stride=max(1, int(1.0 / (SAMPLES_LEFT * end * step))),
         pass_hz=end,
-        noise=float(np.sqrt(spectrum.floor)) / largest,
+        noise=float(np.sqrt(spectrum.noise)) / largest,
     )
 
 

@@ -1,7 +1,8 @@
 """Spectral lines of sensor data above their noise, measured on the data themselves.
 
-Records are cut into overlapping stretches of some periods each, so that a decay shows where it is strong and the noise
-where nothing else is left. The floor is the median over all stretches and frequencies: a few lines do not move it.
+Records are cut into overlapping stretches of some periods each, so that a decay shows where it is strong. The floor of
+a stretch is the median over its frequencies, which a few lines do not move; rounding to decimals makes it follow the
+motion.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ class LineSpectrum:
     ----------
     frequency_hz : (n_frequency,) Hz.
     power : (n_stretch, n_frequency) sum over sensors; white noise of variance s^2 has the mean n_sensor s^2.
-    floor : mean of the noise, m^2.
+    floor : (n_stretch,) mean power of the noise.
     """
 
     frequency_hz: FloatArray = field(metadata={"unit": "Hz", "axes": "frequency"})
     power: FloatArray = field(metadata={"unit": "m^2", "axes": "stretch,frequency"})
-    floor: float
+    floor: FloatArray = field(metadata={"unit": "m^2", "axes": "stretch"})
 
     @property
     def significant(self) -> BoolArray:
@@ -46,9 +47,20 @@ class LineSpectrum:
         The power of noise in one sensor exceeds L times its mean with probability exp(-L), that of several sensors
         less often.
         """
-        above: BoolArray = self.power > self.floor * np.log(self.power.size / FALSE_ALARM)
+        above: BoolArray = self.power > self.floor[:, None] * np.log(self.power.size / FALSE_ALARM)
         above[:, : LOBE + 1] = False  # offsets and drift
         return above
+
+    @property
+    def noise(self) -> float:
+        """Variance of the noise of a sample, all sensors together, mean over the stretches, m^2."""
+        return float(self.floor.mean())
+
+    @property
+    def signal(self) -> FloatArray:
+        """Mean power above the noise at significant frequencies, 0 at others, (n_frequency,)."""
+        above = np.maximum(self.power.mean(axis=0) - self.noise, 0.0)
+        return np.where(self.significant.any(axis=0), above, 0.0)
 
     @property
     def resolution_hz(self) -> float:
@@ -80,7 +92,7 @@ def line_spectrum(samples: Sequence[FloatArray], step: float) -> LineSpectrum:
     # median over mean of a chi-squared variable with two degrees of freedom per sensor (Wilson and Hilferty 1931)
     share = (1.0 - 1.0 / (9.0 * samples[0].shape[1])) ** 3
     stacked = np.array(power)
-    floor = float(np.median(stacked[:, LOBE + 1 :])) / share
+    floor = np.median(stacked[:, LOBE + 1 :], axis=1) / share
     return LineSpectrum(np.fft.rfftfreq(length, step), stacked, floor)
 
 
@@ -121,18 +133,15 @@ def signal_end_hz(spectrum: LineSpectrum) -> float:
 
     over the significant frequencies (Wiener's filter among those that only pass or stop).
     """
-    weight = spectrum.frequency_hz**4
-    signal = np.where(spectrum.significant.any(axis=0), np.maximum(spectrum.power.mean(axis=0) - spectrum.floor, 0), 0)
+    weight, signal = spectrum.frequency_hz**4, spectrum.signal
     lost = np.sum(weight * signal) - np.cumsum(weight * signal)
-    return float(spectrum.frequency_hz[np.argmin(lost + np.cumsum(weight) * spectrum.floor)])
+    return float(spectrum.frequency_hz[np.argmin(lost + np.cumsum(weight) * spectrum.noise)])
 
 
 def acceleration_noise(spectrum: LineSpectrum, step: float) -> float:
     """Return the noise in second differences of order 8 relative to the signal in them, both RMS."""
-    significant = spectrum.significant.any(axis=0)
     omega = 2.0 * np.pi * spectrum.frequency_hz
-    signal = np.where(significant, np.maximum(spectrum.power.mean(axis=0) - spectrum.floor, 0.0), 0.0)
     # both halves of the spectrum, mean over the frequencies of a stretch
-    moving = float(np.sum(omega**4 * signal)) / len(omega)
+    moving = float(np.sum(omega**4 * spectrum.signal)) / len(omega)
     gain = (2.0 * sum(SECOND)) ** 2 + 2.0 * sum(weight**2 for weight in SECOND)
-    return float(np.sqrt(gain * spectrum.floor / max(moving, np.finfo(float).tiny))) / step**2
+    return float(np.sqrt(gain * spectrum.noise / max(moving, np.finfo(float).tiny))) / step**2
