@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 
-
 # Entries of an array that an error shows.
 SHOWN_ENTRIES = 12
 

@@ -63,9 +63,9 @@ def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) 
             yield f"trajectory '{trajectory.name}' was resampled to a step of {chart.recorded_step:.6g} s"
     if chart.low_pass is not None:
         yield (
-            f"the sensors carry noise of {100 * chart.low_pass.noise:.2g} % of the largest motion, which derivatives at "
-            f"their time step would enlarge: above {chart.low_pass.pass_hz:.4g} Hz, where no spectral line stands out of "
-            f"it, they were smoothed, and every {chart.step:.4g} s is used; errors are those of the recorded samples"
+            f"the sensors carry noise of {100 * chart.low_pass.noise:.2g} % of the largest motion, which derivatives "
+            f"would enlarge: they were smoothed above {chart.low_pass.pass_hz:.4g} Hz, where no spectral line stands "
+            f"out of it, and every {chart.step:.4g} s is used; errors are those of the recorded samples"
         )
     if chart.doubt:
         yield (

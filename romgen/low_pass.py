@@ -46,6 +46,11 @@ class LowPass:
     pass_hz: float
     noise: float
 
+    @property
+    def noise_gain(self) -> float:
+        """RMS of white noise after the low-pass relative to that before."""
+        return float(np.linalg.norm(self.taps))
+
 
 def low_pass(spectrum: LineSpectrum, step: float, largest: float) -> LowPass | None:
     """Return the low-pass that noisy data need before their derivatives are taken; None where they need none.
@@ -73,9 +78,7 @@ def low_pass(spectrum: LineSpectrum, step: float, largest: float) -> LowPass | N
     )
 
 
-def smoothed(
-    filtered: LowPass, t: FloatArray, x: FloatArray, where: str
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def smoothed(filtered: LowPass, t: FloatArray, x: FloatArray, where: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return times kept (n_kept,), displacement as recorded and as smoothed there, (n_kept, n_sensor).
 
     Raises

@@ -92,8 +92,8 @@ def line_spectrum(samples: Sequence[FloatArray], step: float) -> LineSpectrum:
     # median over mean of a chi-squared variable with two degrees of freedom per sensor (Wilson and Hilferty 1931)
     share = (1.0 - 1.0 / (9.0 * samples[0].shape[1])) ** 3
     stacked = np.array(power)
-    floor = np.median(stacked[:, LOBE + 1 :], axis=1) / share
-    return LineSpectrum(np.fft.rfftfreq(length, step), stacked, floor)
+    floor: FloatArray = np.asarray(np.median(stacked[:, LOBE + 1 :], axis=1)) / share
+    return LineSpectrum(np.fft.rfftfreq(length, step).astype(np.float64), stacked, floor)
 
 
 def strongest_period(x: FloatArray) -> float:

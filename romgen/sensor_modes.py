@@ -50,7 +50,8 @@ def learn_sensor_chart(training: Sequence[Trajectory], n_mode: int) -> SensorCha
     filtered = low_pass(spectrum, step, max(float(np.linalg.norm(x, axis=1).max()) for x in recorded))
     samples = [grid_samples(trajectory, step, filtered)[2] for trajectory in training]
     grid = step if filtered is None else step * filtered.stride
-    shapes = informative_directions(np.vstack(samples), n_mode)
+    noise = np.sqrt(spectrum.noise / samples[0].shape[1]) * (1.0 if filtered is None else filtered.noise_gain)
+    shapes = informative_directions(np.vstack(samples), n_mode, float(noise))
     held = _Held(spectrum, shapes.shape[1])
     charts: list[SensorChart] = []
     failures: list[InputError | NumericalError] = []
@@ -70,7 +71,10 @@ def learn_sensor_chart(training: Sequence[Trajectory], n_mode: int) -> SensorCha
             return charts[-1]
     if not charts:
         raise held.explained(failures[0], n_mode)
-    return min(charts, key=lambda chart: float(held.distances(chart).max()))
+    best = min(charts, key=lambda chart: float(held.distances(chart).max()))
+    if held.has_strangers(best) and held.n_mode < n_mode:
+        raise held.explained(NumericalError(best.doubt, where="sensor chart"), n_mode)
+    return best
 
 
 @dataclass(frozen=True)
@@ -97,15 +101,19 @@ class _Held:
         distances: FloatArray = np.abs(chart.frequency_hz[:, None] - lines).min(axis=1)
         return distances
 
+    def has_strangers(self, chart: SensorChart) -> bool:
+        """Whether the chart has a mode without a line."""
+        return bool((self.distances(chart) > self.spectrum.resolution_hz).any())
+
     def doubt(self, chart: SensorChart) -> str:
         """Say what speaks against the modes of a chart; "" where nothing does."""
-        shown = f"the spectrum shows {_listed(self.lines)}"
-        far = self.distances(chart) > self.spectrum.resolution_hz
-        if far.any():
-            return f"the chart of the sensors has a mode at {_listed(chart.frequency_hz[far])}, {shown}"
-        if self.n_mode < len(far):
-            return f"the chart of the sensors has modes at {_listed(chart.frequency_hz)}, {shown} and the sensors one shape"
-        return ""
+        few = self.n_mode < len(chart.frequency_hz)
+        if not few and not self.has_strangers(chart):
+            return ""
+        found, shown = _listed(chart.frequency_hz), _listed(self.lines)
+        return f"the chart of the sensors has modes at {found}, the spectrum has lines at {shown}" + (
+            " and the sensors show no more shapes than these" if few else ""
+        )
 
     def explained(self, failure: InputError | NumericalError, n_mode: int) -> InputError | NumericalError:
         """Return the failure of a chart; where the data hold too few modes, an error that says so."""
@@ -117,7 +125,7 @@ class _Held:
             f"{n_mode} master modes are asked for, but the data hold {modes}",
             where="sensor chart",
             value=f"spectral lines at {_listed(self.lines)}",
-            advice=f"set [learn] master_modes to {list(range(1, count + 1))}, or add motions in which the others are large",
+            advice=f"set [learn] master_modes to {list(range(1, count + 1))}, or excite the other modes more",
         )
 
 
@@ -125,14 +133,16 @@ def _listed(frequencies: Iterable[float]) -> str:
     return ", ".join(f"{f:.4g}" for f in frequencies) + " Hz"
 
 
-def informative_directions(x: FloatArray, n_mode: int) -> FloatArray:
+def informative_directions(x: FloatArray, n_mode: int, noise: float) -> FloatArray:
     """Return the strongest principal directions of x (n_time, n_sensor) as columns, at most n_mode.
 
-    Those below a share of the strongest carry no mode of their own.
+    Those below a share of the strongest, or with no more signal than ``noise`` (RMS of a sensor), carry no mode of
+    their own.
     """
     shapes = principal_directions(x.T @ x)
-    strength = np.sqrt(np.mean((x @ shapes) ** 2, axis=0))
-    return shapes[:, : min(n_mode, int((strength > INFORMATIVE * strength[0]).sum()))]
+    power = np.mean((x @ shapes) ** 2, axis=0)
+    informative = power > np.maximum(INFORMATIVE**2 * power[0], 2.0 * noise**2)
+    return shapes[:, : min(n_mode, int(informative.sum()))]
 
 
 def principal_directions(gram: FloatArray) -> FloatArray:

@@ -170,7 +170,8 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
     backward = np.flatnonzero(np.diff(t) <= 0)
     if backward.size:
         row = int(backward[0]) + 1
-        raise InputError("time does not increase", where=f"{where}, row {row}", value=f"{float(t[row - 1])!r} then {float(t[row])!r}")
+        before, after = t[row - 1 : row + 1].tolist()
+        raise InputError("time does not increase", where=f"{where}, row {row}", value=f"{before!r} then {after!r}")
     check_magnitude(x, where)
     constant = np.flatnonzero(np.ptp(x, axis=0) == 0)
     if constant.size:
