@@ -65,7 +65,7 @@ def low_pass(spectrum: LineSpectrum, step: float, largest: float) -> LowPass | N
     Source: Kaiser 1974, length and shape of the window from ripple and width of the transition.
     """
     end = signal_end_hz(spectrum)
-    if STOP * end >= 0.5 / step or acceleration_noise(spectrum, step) <= SMOOTHED:
+    if end == 0.0 or STOP * end >= 0.5 / step or acceleration_noise(spectrum, step) <= SMOOTHED:
         return None
     half = int(np.ceil((RIPPLE_DB - 7.95) / (2.285 * 2.0 * np.pi * (STOP - 1.0) * end * step) / 2.0))
     k = np.arange(-half, half + 1)

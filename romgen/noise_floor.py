@@ -14,11 +14,14 @@ import numpy as np
 
 from romgen.arrays import BoolArray, FloatArray
 from romgen.differences import SECOND
+from romgen.errors import InputError
 
 # A stretch has so many periods of the strongest line; stretches overlap by half.
 STRETCH_PERIODS = 20.0
 # Half width in bins of a line in the spectrum of the window sin^4, which falls off as the fifth power beyond.
 LOBE = 3
+# So many samples leave one frequency beside offsets and drift.
+FEWEST = 2 * (LOBE + 1)
 # Equivalent noise bandwidth of sin^4 in bins (Harris, Proc. IEEE 66 (1978) 51-83): closer lines are one.
 RESOLUTION = 35.0 / 18.0
 # White noise passes for a line anywhere in the spectra of a study with this probability.
@@ -78,9 +81,17 @@ def line_spectrum(samples: Sequence[FloatArray], step: float) -> LineSpectrum:
     Parameters
     ----------
     samples : (n_time, n_sensor) of each record, m; step : s.
+
+    Raises
+    ------
+    InputError : a record too short for a spectrum.
     """
+    shortest = min(map(len, samples))
+    if shortest < FEWEST:
+        advice = f"give at least {FEWEST} samples"
+        raise InputError("too short for a spectrum", where="sensor chart", value=f"{shortest} samples", advice=advice)
     period = strongest_period(max(samples, key=len))
-    length = min(int(np.ceil(STRETCH_PERIODS * period)), *map(len, samples))
+    length = min(max(FEWEST, int(np.ceil(STRETCH_PERIODS * period))), shortest)
     window = np.sin(np.pi * (np.arange(length) + 0.5) / length)[:, None] ** 4
     window /= np.sqrt(np.sum(window**2))
     power = []

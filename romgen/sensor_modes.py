@@ -130,7 +130,8 @@ class _Held:
 
 
 def _listed(frequencies: Iterable[float]) -> str:
-    return ", ".join(f"{f:.4g}" for f in frequencies) + " Hz"
+    shown = ", ".join(f"{f:.4g}" for f in frequencies)
+    return f"{shown} Hz" if shown else "no frequency"
 
 
 def informative_directions(x: FloatArray, n_mode: int, noise: float) -> FloatArray:

@@ -25,7 +25,7 @@ SETTINGS = LearnSettings(master_modes=(1,), internal_resonance=(), order="auto")
 
 
 def decay(name: str, amplitude: float, cubic: float, quintic: float, longer: float = 1.0) -> Trajectory:
-    """x'' + (0.06 / longer) x' + x + cubic x^3 + quintic x^5 = 0 from rest at ``amplitude``, in units of 1/RATE seconds."""
+    """x'' + (0.06 / longer) x' + x + cubic x^3 + quintic x^5 = 0 from ``amplitude``, times in 1/RATE seconds."""
 
     def acceleration(x: FloatArray, v: FloatArray) -> FloatArray:
         return -0.06 / longer * v - x - cubic * x**3 - quintic * x**5

@@ -148,6 +148,13 @@ def test_the_number_of_samples_needed_is_enough() -> None:
     assert 60 < needed < 200
 
 
+@pytest.mark.parametrize("n", [2, 7, 9, 30])
+def test_records_of_a_few_samples_are_refused_in_one_line(n: int) -> None:
+    (motion, _) = decays(0.01)
+    with pytest.raises((InputError, NumericalError), match=r"sensor chart|differences"):
+        learn_sensor_chart([replace(motion, t=motion.t[:n], displacement=motion.displacement[:n])], 2)
+
+
 def test_a_record_too_short_for_a_chart_is_refused() -> None:
     motions = decays(0.02, step=2e-5)
     chart = learn_sensor_chart(motions, 2)
