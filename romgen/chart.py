@@ -10,6 +10,7 @@ import numpy as np
 from romgen.arrays import BoolArray, FloatArray
 from romgen.differences import DROPPED, first_derivative, is_uniform, resample, second_derivative
 from romgen.errors import InputError
+from romgen.low_pass import LowPass, smoothed
 from romgen.trajectory import Trajectory
 
 
@@ -23,7 +24,7 @@ class ReducedTrajectory:
     t : (n_time,) s.
     y : (n_time, 2m) eta_1..m and eta'_1..m.
     y_dot : (n_time, 2m) their time derivatives.
-    displacement, velocity : (n_time, n_sensor) m and m/s.
+    displacement, velocity : (n_time, n_sensor) m as recorded, and m/s.
     """
 
     name: str
@@ -49,12 +50,21 @@ class SensorChart:
     delays : samples in a window, 1 = the sensors themselves.
     step : s, of the uniform grid of windows and differences.
     frequency_hz : (m,) frequencies of the linear fit that defines P.
+    low_pass : what noisy records go through first, to that grid; None where they stay as they are.
+    doubt : why the frequencies may not be those of the modes, one clause; "" where nothing speaks against them.
     """
 
     projection: FloatArray = field(metadata={"unit": "1", "axes": "mode,feature"})
     delays: int
     step: float
     frequency_hz: FloatArray = field(metadata={"unit": "Hz", "axes": "mode"})
+    low_pass: LowPass | None = None
+    doubt: str = ""
+
+    @property
+    def recorded_step(self) -> float:
+        """The step in s of the records before the low-pass."""
+        return self.step if self.low_pass is None else self.step / self.low_pass.stride
 
     def of_modes(self, rows: Sequence[int]) -> SensorChart:
         """Return the chart of some of its modes, by their rows."""
@@ -96,10 +106,15 @@ def modal_chart(trajectory: Trajectory, modes: Sequence[int]) -> ReducedTrajecto
 def sensor_chart(chart: SensorChart, trajectory: Trajectory) -> ReducedTrajectory:
     """Return y = (P X, P X') and y' with X' and X'' by central differences of order 8.
 
-    The first and last 4 samples have no difference and the last delays - 1 samples no window; both are dropped.
-    Sampling other than ``chart.step`` is resampled by a spline.
+    The first and last 4 samples have no difference and the last delays - 1 samples no window; both are dropped, and so
+    are the ends that a low-pass loses. Sampling other than ``chart.recorded_step`` is resampled by a spline.
+
+    Raises
+    ------
+    InputError : too short for the low-pass, the windows and the differences.
     """
-    t, x = uniform_samples(trajectory, chart.step)
+    t, recorded, x = grid_samples(trajectory, chart.recorded_step, chart.low_pass)
+    _check_length(len(x), chart.delays, chart.low_pass, f"trajectory '{trajectory.name}'")
     eta = windows(x, chart.delays) @ chart.projection.T
     inner = slice(DROPPED, len(eta) - DROPPED)
     eta_dot, eta_ddot = first_derivative(eta, chart.step), second_derivative(eta, chart.step)
@@ -108,9 +123,22 @@ def sensor_chart(chart: SensorChart, trajectory: Trajectory) -> ReducedTrajector
         t=t[: len(eta)][inner],
         y=np.hstack([eta[inner], eta_dot]),
         y_dot=np.hstack([eta_dot, eta_ddot]),
-        displacement=x[: len(eta)][inner],
+        displacement=recorded[: len(eta)][inner],
         velocity=first_derivative(x, chart.step)[: len(eta_dot)],
     )
+
+
+def grid_samples(
+    trajectory: Trajectory, step: float, low_pass: LowPass | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return t, displacement as recorded, and the one to differentiate, on the uniform grid of the chart.
+
+    Parameters
+    ----------
+    step : s, of the records; low_pass : that the data need, None leaves them.
+    """
+    t, x = uniform_samples(trajectory, step)
+    return (t, x, x) if low_pass is None else smoothed(low_pass, t, x, f"trajectory '{trajectory.name}'")
 
 
 def uniform_samples(trajectory: Trajectory, step: float) -> tuple[FloatArray, FloatArray]:
@@ -124,3 +152,20 @@ def windows(x: FloatArray, delays: int) -> FloatArray:
     """Return X (n_time - delays + 1, n_sensor * delays): x(t_k), x(t_{k+1}), .. side by side."""
     view = np.lib.stride_tricks.sliding_window_view(x, delays, axis=0)
     return view.transpose(0, 2, 1).reshape(len(view), -1)
+
+
+def recorded_length(n_sample: int, low_pass: LowPass | None) -> int:
+    """Return how many recorded samples leave n_sample on the grid of the chart."""
+    return n_sample if low_pass is None else (n_sample - 1) * low_pass.stride + len(low_pass.taps)
+
+
+def _check_length(n_sample: int, delays: int, low_pass: LowPass | None, where: str) -> None:
+    """Refuse a record that leaves no sample after windows and differences."""
+    needed = delays + 2 * DROPPED
+    if n_sample < needed:
+        raise InputError(
+            "trajectory too short for windows and derivatives",
+            where=where,
+            value=f"{recorded_length(n_sample, low_pass)} samples",
+            advice=f"at least {recorded_length(needed, low_pass)} samples are needed",
+        )

@@ -4,6 +4,27 @@ from __future__ import annotations
 
 import errno
 
+# Entries of an array that an error shows.
+SHOWN_ENTRIES = 12
+
+
+def _shown(value: object) -> str:
+    """Return a value in one line; numbers of numpy as plain ones (by their own method: no import for an error)."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple | list):
+        inside = ", ".join(repr(entry) if isinstance(entry, str) else _shown(entry) for entry in value)
+        if isinstance(value, list):
+            return f"[{inside}]"
+        return f"({inside},)" if len(value) == 1 else f"({inside})"
+    if not hasattr(value, "tolist"):
+        return " ".join(repr(value).split())
+    if getattr(value, "ndim", 0) == 0:
+        return repr(value.tolist())
+    flat = value.ravel().tolist()  # type: ignore[attr-defined]
+    entries = [f"{entry:.5g}" if isinstance(entry, float | complex) else str(entry) for entry in flat[:SHOWN_ENTRIES]]
+    return " ".join(entries) + (f" .. ({len(flat)} entries)" if len(flat) > SHOWN_ENTRIES else "")
+
 
 class RomgenError(Exception):
     """Base of all failures that a user sees as one line, never as a stack trace.
@@ -12,7 +33,8 @@ class RomgenError(Exception):
     ----------
     what : the failure in one clause.
     where : file, table, record or stage that it concerns.
-    value : the offending value, shown with ``repr`` unless it is a string.
+    value : the offending value, shown with ``repr`` unless it is a string; arrays with five digits, the first few
+        entries, in one line.
     advice : what to do about it.
     """
 
@@ -22,8 +44,7 @@ class RomgenError(Exception):
         self.what, self.where, self.value, self.advice = what, where, value, advice
         parts = [f"{where}: {what}" if where else what]
         if value is not None:
-            shown = value if isinstance(value, str) else " ".join(repr(value).split())  # long arrays break lines
-            parts.append(f"got {shown}")
+            parts.append(f"got {_shown(value)}")
         if advice:
             parts.append(advice)
         super().__init__("; ".join(parts))

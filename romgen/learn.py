@@ -20,7 +20,7 @@ from romgen.reduced_model import ReducedModel
 from romgen.sensor_modes import learn_sensor_chart
 from romgen.settings import LearnSettings
 from romgen.stability import tried_stability
-from romgen.trajectory import Trajectory
+from romgen.trajectory import Trajectory, check_magnitude
 from romgen.trajectory_error import TrajectoryError, snapshot_rows, trajectory_error
 from romgen.trajectory_fit import fit_on_trajectories
 
@@ -226,6 +226,7 @@ def _check(
     for trajectory in [*training, *validation]:
         if trajectory.sensors != training[0].sensors:
             raise InputError("other sensors", where=f"trajectory '{trajectory.name}'", value=trajectory.sensors)
+        check_magnitude(trajectory.displacement, f"trajectory '{trajectory.name}'")
     if loads is not None and not _is_modal(training):
         raise InputError("modal loads need trajectories with modal fields", where="learn", value=loads.inputs)
     if known is not None and not _is_modal(training):

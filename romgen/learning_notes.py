@@ -59,8 +59,19 @@ def _chart_notes(trajectories: Sequence[Trajectory], chart: SensorChart | None) 
     if chart is None:
         return
     for trajectory in trajectories:
-        if not is_uniform(trajectory.t, chart.step):
-            yield f"trajectory '{trajectory.name}' was resampled to a step of {chart.step:.6g} s"
+        if not is_uniform(trajectory.t, chart.recorded_step):
+            yield f"trajectory '{trajectory.name}' was resampled to a step of {chart.recorded_step:.6g} s"
+    if chart.low_pass is not None:
+        yield (
+            f"the sensors carry noise of {100 * chart.low_pass.noise:.2g} % of the largest motion, which derivatives "
+            f"would enlarge: they were smoothed above {chart.low_pass.pass_hz:.4g} Hz, where no spectral line stands "
+            f"out of it, and every {chart.step:.4g} s is used; errors are those of the recorded samples"
+        )
+    if chart.doubt:
+        yield (
+            f"{chart.doubt}: the chart may be wrong; check the number of master modes, the sampling and the noise, or "
+            "give longer decays"
+        )
     samples = 1.0 / (chart.step * float(np.max(chart.frequency_hz)))
     if samples < SAMPLES_PER_PERIOD:
         yield (

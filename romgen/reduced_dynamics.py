@@ -120,7 +120,7 @@ def decaying_modes(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         raise NumericalError(
             "the fitted linear part is not that of decaying oscillations",
             where="reduced dynamics",
-            value=np.array2string(values, precision=5),
+            value=values,
             advice="give longer or cleaner training decays, a later start_time, or a lower order",
         )
     order = upper[np.argsort(values.imag[upper])]

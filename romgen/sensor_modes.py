@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from romgen.arrays import ComplexArray, FloatArray
-from romgen.chart import SensorChart, uniform_samples, windows
+from romgen.chart import SensorChart, grid_samples, recorded_length, uniform_samples, windows
 from romgen.differences import DROPPED, first_derivative, second_derivative
 from romgen.errors import InputError, NumericalError
+from romgen.low_pass import LowPass, low_pass
+from romgen.noise_floor import LineSpectrum, line_frequencies, line_spectrum, separate_lines, strongest_period
 from romgen.polynomial import exponents, monomials
 from romgen.regression import ridge_fit
 from romgen.trajectory import Trajectory
@@ -28,7 +31,8 @@ def learn_sensor_chart(training: Sequence[Trajectory], n_mode: int) -> SensorCha
 
     With at least n_mode informative sensors the principal displacements u and u' are the state of the linear fit,
     otherwise the 2 n_mode principal components of delay windows. The eigenvectors of its linear part give P.
-    Differences enlarge noise and windows average it: where the first fit finds no decaying modes, windows are tried.
+    Differences enlarge noise: what is noisy and finely sampled is low-passed first. Windows average what is left:
+    where the first fit finds no decaying modes, or others than the spectrum shows, windows are tried.
 
     Parameters
     ----------
@@ -41,19 +45,105 @@ def learn_sensor_chart(training: Sequence[Trajectory], n_mode: int) -> SensorCha
     NumericalError : the linear fit has no n_mode oscillating, decaying modes.
     """
     step = min(float(np.median(np.diff(trajectory.t))) for trajectory in training)
-    samples = [uniform_samples(trajectory, step)[1] for trajectory in training]
-    stacked = np.vstack(samples)
-    shapes = principal_directions(stacked.T @ stacked)
-    strength = np.sqrt(np.mean((stacked @ shapes) ** 2, axis=0))
-    if int((strength > INFORMATIVE * strength[0]).sum()) < n_mode:
-        return _delay_chart(samples, n_mode, step)
-    try:
-        return _displacement_chart(samples, shapes[:, :n_mode], step)
-    except NumericalError as noisy:
+    recorded = [uniform_samples(trajectory, step)[1] for trajectory in training]
+    spectrum = line_spectrum(recorded, step)
+    filtered = low_pass(spectrum, step, max(float(np.linalg.norm(x, axis=1).max()) for x in recorded))
+    samples = [grid_samples(trajectory, step, filtered)[2] for trajectory in training]
+    grid = step if filtered is None else step * filtered.stride
+    noise = np.sqrt(spectrum.noise / samples[0].shape[1]) * (1.0 if filtered is None else filtered.noise_gain)
+    shapes = informative_directions(np.vstack(samples), n_mode, float(noise))
+    held = _Held(spectrum, shapes.shape[1])
+    charts: list[SensorChart] = []
+    failures: list[InputError | NumericalError] = []
+    for number in range(2):
         try:
-            return _delay_chart(samples, n_mode, step)
-        except (InputError, NumericalError):
-            raise noisy from None
+            if number == 1:
+                found = _delay_chart(samples, n_mode, grid, filtered)
+            elif shapes.shape[1] == n_mode:
+                found = _displacement_chart(samples, shapes, grid)
+            else:
+                continue
+        except (InputError, NumericalError) as failure:
+            failures.append(failure)
+            continue
+        charts.append(replace(found, low_pass=filtered, doubt=held.doubt(found)))
+        if not charts[-1].doubt:
+            return charts[-1]
+    if not charts:
+        raise held.explained(failures[0], n_mode)
+    best = min(charts, key=lambda chart: float(held.distances(chart).max()))
+    if held.has_strangers(best) and held.n_mode < n_mode:
+        raise held.explained(NumericalError(best.doubt, where="sensor chart"), n_mode)
+    return best
+
+
+@dataclass(frozen=True)
+class _Held:
+    """What the data hold before any fit: lines of the spectrum and independent shapes of the sensors."""
+
+    spectrum: LineSpectrum
+    n_shape: int
+
+    @property
+    def lines(self) -> tuple[float, ...]:
+        return separate_lines(self.spectrum, INFORMATIVE)
+
+    @property
+    def n_mode(self) -> int:
+        """Modes of one frequency have shapes of their own, modes of one shape frequencies."""
+        return max(len(self.lines), self.n_shape)
+
+    def distances(self, chart: SensorChart) -> FloatArray:
+        """Return how far each frequency of the chart is from a line at any amplitude, (m,) Hz."""
+        lines = line_frequencies(self.spectrum)
+        if not lines.size:
+            return np.zeros(len(chart.frequency_hz))
+        distances: FloatArray = np.abs(chart.frequency_hz[:, None] - lines).min(axis=1)
+        return distances
+
+    def has_strangers(self, chart: SensorChart) -> bool:
+        """Whether the chart has a mode without a line."""
+        return bool((self.distances(chart) > self.spectrum.resolution_hz).any())
+
+    def doubt(self, chart: SensorChart) -> str:
+        """Say what speaks against the modes of a chart; "" where nothing does."""
+        few = self.n_mode < len(chart.frequency_hz)
+        if not few and not self.has_strangers(chart):
+            return ""
+        found, shown = _listed(chart.frequency_hz), _listed(self.lines)
+        return f"the chart of the sensors has modes at {found}, the spectrum has lines at {shown}" + (
+            " and the sensors show no more shapes than these" if few else ""
+        )
+
+    def explained(self, failure: InputError | NumericalError, n_mode: int) -> InputError | NumericalError:
+        """Return the failure of a chart; where the data hold too few modes, an error that says so."""
+        count = self.n_mode
+        if count >= n_mode or not self.lines:
+            return failure
+        modes = "one mode" if count == 1 else f"{count} modes"
+        return NumericalError(
+            f"{n_mode} master modes are asked for, but the data hold {modes}",
+            where="sensor chart",
+            value=f"spectral lines at {_listed(self.lines)}",
+            advice=f"set [learn] master_modes to {list(range(1, count + 1))}, or excite the other modes more",
+        )
+
+
+def _listed(frequencies: Iterable[float]) -> str:
+    shown = ", ".join(f"{f:.4g}" for f in frequencies)
+    return f"{shown} Hz" if shown else "no frequency"
+
+
+def informative_directions(x: FloatArray, n_mode: int, noise: float) -> FloatArray:
+    """Return the strongest principal directions of x (n_time, n_sensor) as columns, at most n_mode.
+
+    Those below a share of the strongest, or with no more signal than ``noise`` (RMS of a sensor), carry no mode of
+    their own.
+    """
+    shapes = principal_directions(x.T @ x)
+    power = np.mean((x @ shapes) ** 2, axis=0)
+    informative = power > np.maximum(INFORMATIVE**2 * power[0], 2.0 * noise**2)
+    return shapes[:, : min(n_mode, int(informative.sum()))]
 
 
 def principal_directions(gram: FloatArray) -> FloatArray:
@@ -78,7 +168,7 @@ def linear_modes(c: FloatArray, c_dot: FloatArray) -> tuple[ComplexArray, Comple
         raise NumericalError(
             "the linear dynamics of the sensors are not that of decaying oscillations",
             where="sensor chart",
-            value=np.array2string(eigenvalues, precision=4),
+            value=eigenvalues,
             advice="check the number of master modes, units, sampling and noise, or give longer decays",
         )
     order = upper[np.argsort(eigenvalues.imag[upper])]
@@ -102,10 +192,16 @@ def _displacement_chart(samples: Sequence[FloatArray], shapes: FloatArray, step:
     )
 
 
-def _delay_chart(samples: Sequence[FloatArray], m: int, step: float) -> SensorChart:
-    delays = _window_length(samples, step)
-    if min(map(len, samples)) < delays + 4 * DROPPED:
-        raise InputError("trajectory shorter than a delay window", where="sensor chart", value=min(map(len, samples)))
+def _delay_chart(samples: Sequence[FloatArray], m: int, step: float, filtered: LowPass | None) -> SensorChart:
+    delays = int(np.ceil(WINDOW_PERIODS * strongest_period(max(samples, key=len))))
+    shortest, needed = min(map(len, samples)), delays + 4 * DROPPED
+    if shortest < needed:
+        raise InputError(
+            "trajectory shorter than a delay window",
+            where="sensor chart",
+            value=f"{recorded_length(shortest, filtered)} samples",
+            advice=f"at least {recorded_length(needed, filtered)} samples are needed, two periods and the differences",
+        )
     X = [windows(x, delays) for x in samples]
     basis = principal_directions(np.asarray(sum(block.T @ block for block in X)))[:, : 2 * m]
     c = [block @ basis for block in X]
@@ -121,14 +217,6 @@ def _delay_chart(samples: Sequence[FloatArray], m: int, step: float) -> SensorCh
         step=step,
         frequency_hz=eigenvalues.imag / (2.0 * np.pi),
     )
-
-
-def _window_length(samples: Sequence[FloatArray], step: float) -> int:
-    """Return the samples in WINDOW_PERIODS of the strongest spectral line of the training data."""
-    x = max(samples, key=len)
-    power = np.sum(np.abs(np.fft.rfft(x - x.mean(axis=0), axis=0)) ** 2, axis=1)
-    strongest = max(1, int(power.argmax()))
-    return int(np.ceil(WINDOW_PERIODS * len(x) / strongest))
 
 
 def _rotated_real(shape: ComplexArray) -> FloatArray:

@@ -164,8 +164,9 @@ def segments(
 ) -> tuple[Segment, ...]:
     """Return n segments of each motion that have samples that count, thinned to a few per period of the fastest mode.
 
-    Initial states are those of the signals, at the start from its first undistorted sample, turned back by the linear
-    part.
+    A motion begins with its first sample that counts: before it, at amplitudes that no sample of the fit has, the model
+    may blow up. Initial states are those of the signals, where these are distorted from the first sample that is not,
+    turned back by the linear part.
     """
     eigenvalues = start.dynamics.eigenvalues
     m, period = len(eigenvalues), 2.0 * np.pi / float(eigenvalues.imag.max())
@@ -174,11 +175,12 @@ def segments(
         stride = max(1, int(period / (SAMPLES_PER_PERIOD * (r.t[1] - r.t[0]))))
         share = 1.0 / float(np.linalg.norm(r.y[keep, :m], axis=1).max())
         bounds = np.arange(n + 1) * len(r.t) // n
-        for k, (first, last) in enumerate(pairwise(bounds)):
+        begin = int(keep.argmax())
+        for first, last in pairwise(np.maximum(bounds, begin)):
             rows = slice(int(first), int(last), stride)
-            if k > 0 and not keep[rows].any():
+            if not keep[rows].any():
                 continue
-            turned = signal[edge] * np.exp(-eigenvalues * (r.t[edge] - r.t[0]))
-            z0 = turned if k == 0 else signal[first]
+            clear = max(edge, int(first)) if first == begin else int(first)
+            z0 = signal[clear] * np.exp(-eigenvalues * (r.t[clear] - r.t[first]))
             found.append(Segment(r.t[rows], r.y[rows, :m], z0, keep[rows], number, share))
     return tuple(found)

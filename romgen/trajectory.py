@@ -8,6 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from romgen.arrays import FloatArray, IntArray
+from romgen.errors import InputError
+
+# Displacements between these, in m, have squares of accelerations and of spectra within double precision, whose range
+# is 1e-308 to 1e308: 1e100 is left for the squares of time steps and for the number of samples.
+SMALLEST, LARGEST = 1e-100, 1e100
 
 
 @dataclass(frozen=True)
@@ -39,3 +44,20 @@ class Trajectory:
     eta_ddot: FloatArray | None = field(default=None, metadata={"unit": "m kg^0.5/s^2", "axes": "time,mode"})
     snapshots: npt.NDArray[np.float32] | None = field(default=None, metadata={"unit": "m", "axes": "snapshot,dof"})
     snapshot_index: IntArray | None = field(default=None, metadata={"unit": "1", "axes": "snapshot"})
+
+
+def check_magnitude(displacement: FloatArray, where: str) -> None:
+    """Refuse displacements (n_time, n_sensor) in m whose squares leave double precision.
+
+    Raises
+    ------
+    InputError : the largest is above 1e100 m, or below 1e-100 m.
+    """
+    largest = float(np.abs(displacement).max(initial=0.0))
+    if largest != 0.0 and not SMALLEST <= largest <= LARGEST:
+        raise InputError(
+            "displacements too large or too small to compute with",
+            where=where,
+            value=f"at most {largest:.3g} m",
+            advice="check the unit of the displacements",
+        )

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-import scipy.io
 
 from romgen.arrays import FloatArray
 from romgen.errors import InputError
 from romgen.settings.quantities import unit_factor
-from romgen.trajectory import Trajectory
+from romgen.trajectory import Trajectory, check_magnitude
 from romgen.trajectory_csv import read_csv
+from romgen.trajectory_mat import read_motions
 
+log = logging.getLogger(__name__)
 Pair = tuple[str, FloatArray, FloatArray]
 
 
@@ -24,7 +26,7 @@ def read_trajectories(files: Sequence[Path], sensors: Sequence[str], unit: str) 
 
     Parameters
     ----------
-    files : .mat (cell array with columns t and x, or t and x, x as (n_sensor, n_time); v5 or v7.3), .h5/.hdf5 and
+    files : .mat (``romgen.trajectory_mat``), .h5/.hdf5 and
         .npz (as written by ``write_trajectories``, or t and x alone), .csv (``romgen.trajectory_csv``).
     sensors : names of the rows of x; CSV columns are found by these names.
     unit : unit of displacement where the file has none, e.g. "m" or "mm".
@@ -93,49 +95,31 @@ def _time_first(x: Any, n_time: int) -> FloatArray:
 
 
 def _read_mat(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
-    cells = _mat_v73(path) if h5py.is_hdf5(path) else _mat_v5(path)
     pairs = []
-    for number, (t, x) in enumerate(cells):
+    for number, (label, t, x) in enumerate(read_motions(path)):
         time = np.asarray(t, dtype=np.float64).ravel()
-        pairs.append((f"{path.stem}_{number}", time, _factor(unit, path.name) * _time_first(x, time.size)))
+        name = label or f"{path.stem}_{number}"
+        pairs.append((name, time, _factor(unit, path.name) * _time_first(x, time.size)))
     return pairs
-
-
-def _mat_v5(path: Path) -> list[tuple[FloatArray, FloatArray]]:
-    try:
-        contents = scipy.io.loadmat(path)
-    except (ValueError, NotImplementedError, OSError) as error:
-        raise InputError(f"not a MAT file: {error}", where=str(path)) from error
-    for value in contents.values():
-        if isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 2 and value.shape[1] >= 2:
-            return [(row[0], row[1]) for row in value]
-    if "t" in contents and "x" in contents:
-        return [(contents["t"], contents["x"])]
-    own = sorted(name for name in contents if not name.startswith("__"))
-    raise InputError("neither a cell array with columns t and x, nor t and x", where=str(path), value=own)
-
-
-def _mat_v73(path: Path) -> list[tuple[FloatArray, FloatArray]]:
-    with h5py.File(path) as file:
-        for name, item in file.items():
-            if isinstance(item, h5py.Dataset) and item.dtype == h5py.ref_dtype and item.ndim == 2 and name[0] != "#":
-                # MATLAB stores arrays transposed: cell (n, 2) appears as (2, n), x (n_sensor, n_time) as its transpose.
-                return [(file[item[0, k]][()], file[item[1, k]][()].T) for k in range(item.shape[1])]
-        if "t" in file and "x" in file:
-            return [(file["t"][()], file["x"][()].T)]
-        own = sorted(name for name in file if name[0] != "#")
-    raise InputError("neither a cell array with columns t and x, nor t and x", where=str(path), value=own)
 
 
 def _read_hdf5(path: Path, sensors: Sequence[str], unit: str) -> list[Pair]:
     with h5py.File(path) as file:
         if isinstance(file.get("t"), h5py.Dataset) and isinstance(file.get("x"), h5py.Dataset):
             return [_group_pair(path.stem, file, sensors, unit)]
-        pairs = []
+        pairs, others = [], []
         for name, group in file.items():
-            if not isinstance(group, h5py.Group) or "t" not in group or "x" not in group:
-                raise InputError("group without t and x", where=f"{path.name}/{name}")
-            pairs.append(_group_pair(str(name), group, sensors, unit))
+            held = {"t", "x"} & set(group) if isinstance(group, h5py.Group) else set()
+            if len(held) == 2:
+                pairs.append(_group_pair(str(name), group, sensors, unit))
+            elif held:
+                raise InputError("group without t and x", where=f"{path.name}/{name}", value=sorted(group))
+            else:
+                others.append(str(name))
+    if others and pairs:
+        log.warning("%s: %s is no group with t and x and was not read", path.name, ", ".join(others))
+    elif others:
+        raise InputError("no group with t and x", where=path.name, value=others, advice="it needs arrays t and x")
     return pairs
 
 
@@ -186,7 +170,9 @@ def _check(t: FloatArray, x: FloatArray, sensors: Sequence[str], where: str) -> 
     backward = np.flatnonzero(np.diff(t) <= 0)
     if backward.size:
         row = int(backward[0]) + 1
-        raise InputError("time does not increase", where=f"{where}, row {row}", value=f"{t[row - 1]!r} then {t[row]!r}")
+        before, after = t[row - 1 : row + 1].tolist()
+        raise InputError("time does not increase", where=f"{where}, row {row}", value=f"{before!r} then {after!r}")
+    check_magnitude(x, where)
     constant = np.flatnonzero(np.ptp(x, axis=0) == 0)
     if constant.size:
         raise InputError(

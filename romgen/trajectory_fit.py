@@ -11,7 +11,7 @@ from romgen.arrays import BoolArray, ComplexArray
 from romgen.chart import ReducedTrajectory
 from romgen.differences import is_uniform
 from romgen.dissipative_fit import dissipative
-from romgen.errors import NumericalError
+from romgen.errors import InputError, NumericalError
 from romgen.jackknife import Replicates
 from romgen.linear_reference import LinearReference, linear_reference
 from romgen.normal_form import FitOrigin, NormalFormFit, Resonance, fit_normal_form, resonance_table
@@ -45,6 +45,24 @@ def is_long_enough(training: Sequence[ReducedTrajectory]) -> bool:
     or friction leaves a rest position, a decay does not cross zero to its end.
     """
     return all(is_uniform(r.t) and _periods(r) >= MIN_PERIODS for r in training)
+
+
+def check_long_enough(training: Sequence[ReducedTrajectory]) -> None:
+    """Refuse what ``is_long_enough`` denies, naming the first trajectory that is not.
+
+    Raises
+    ------
+    InputError : irregular samples, or fewer than 20 periods.
+    """
+    for r in training:
+        uniform = is_uniform(r.t)
+        if not uniform or _periods(r) < MIN_PERIODS:
+            raise InputError(
+                f"fits on whole motions need uniform samples and {MIN_PERIODS:g} periods of every strong mode",
+                where=f"[learn] method, trajectory '{r.name}'",
+                value=f"{_periods(r):.3g} periods" if uniform else "irregular samples",
+                advice='give longer decays or a smaller start_time, or set method = "direct"',
+            )
 
 
 def _periods(r: ReducedTrajectory) -> float:

@@ -16,6 +16,7 @@ class LearnSettings(Settings):
     master_modes: tuple[int, ...] = (1, 2)
     internal_resonance: tuple[int, ...] | Literal["auto", "gap"] = "auto"
     order: int | Literal["auto"] = "auto"
+    method: Literal["auto", "direct", "refined"] = "auto"
     geometry_order: int | None = Field(default=None, ge=1, le=9)
     ridge: float = Field(default=1e-8, ge=0.0)
     linear_part: Literal["modes", "fitted"] = "modes"

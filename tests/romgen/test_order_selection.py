@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from romgen.arrays import FloatArray
 from romgen.chart import ReducedTrajectory
+from romgen.errors import InputError
 from romgen.learn import learn
 from romgen.learning_notes import learning_notes
-from romgen.order_selection import UNSTABLE, _improving, _Trial, choose_order
+from romgen.order_selection import GOOD_PERCENT, UNSTABLE, _improving, _Trial, choose_order
 from romgen.polynomial import PolynomialMap
 from romgen.settings import LearnSettings
 from romgen.stability import tried_stability
@@ -22,17 +24,22 @@ RATE = 1000.0
 SETTINGS = LearnSettings(master_modes=(1,), internal_resonance=(), order="auto")
 
 
-def decay(name: str, amplitude: float, cubic: float, quintic: float) -> Trajectory:
-    """x'' + 0.06 x' + x + cubic x^3 + quintic x^5 = 0 from rest at ``amplitude``, in units of 1/RATE seconds."""
+def decay(name: str, amplitude: float, cubic: float, quintic: float, longer: float = 1.0) -> Trajectory:
+    """x'' + (0.06 / longer) x' + x + cubic x^3 + quintic x^5 = 0 from ``amplitude``, times in 1/RATE seconds."""
 
     def acceleration(x: FloatArray, v: FloatArray) -> FloatArray:
-        return -0.06 * v - x - cubic * x**3 - quintic * x**5
+        return -0.06 / longer * v - x - cubic * x**3 - quintic * x**5
 
-    t = np.linspace(0.0, 60.0, 1201)
-    out = solve_ivp(lambda _, s: [s[1], acceleration(s[0], s[1])], (0, 60), [amplitude, 0.0], "DOP853", t, rtol=1e-10)
+    end = 60.0 * longer
+    t = np.linspace(0.0, end, round(1200 * longer) + 1)
+    out = solve_ivp(lambda _, s: [s[1], acceleration(s[0], s[1])], (0, end), [amplitude, 0.0], "DOP853", t, rtol=1e-10)
     x, v = out.y
     velocity, second = RATE * v[:, None], RATE**2 * acceleration(x, v)[:, None]
     return Trajectory(name, t / RATE, ("a",), x[:, None], velocity, x[:, None], velocity, second)
+
+
+def long_decay() -> Trajectory:
+    return decay("long", 0.8, 0.2, 0.3, longer=3.0)
 
 
 def reduced(motion: Trajectory) -> ReducedTrajectory:
@@ -59,6 +66,28 @@ def test_a_given_order_is_kept() -> None:
     table = choose_order([reduced(decay("one", 1.0, 0.2, 0.0))], settings)
     assert table.order == 3
     assert set(table.tried.tolist()) == {3}
+
+
+@pytest.mark.parametrize(("method", "tried"), [("direct", "conjugacy"), ("refined", "trajectories")])
+def test_a_given_method_is_kept(method: str, tried: str) -> None:
+    settings = SETTINGS.model_copy(update={"order": 3, "method": method})
+    table = choose_order([reduced(long_decay())], settings)
+    assert table.method == tried
+    assert set(table.methods) == {tried}
+
+
+def test_fits_on_motions_are_tried_wherever_the_direct_one_is_not_nearly_exact() -> None:
+    """A cubic for a quintic misses by 0.3 %, which was once good enough."""
+    settings = SETTINGS.model_copy(update={"order": 3})
+    table = choose_order([reduced(long_decay())], settings)
+    assert GOOD_PERCENT < table.nmte_percent[0] < 1.0
+    assert set(table.methods) == {"conjugacy", "trajectories"}
+
+
+def test_a_motion_too_short_to_refine_is_refused_where_that_is_asked_for() -> None:
+    settings = SETTINGS.model_copy(update={"order": 3, "method": "refined"})
+    with pytest.raises(InputError, match=r"trajectory 'one': .* 20 periods .*; got 10 periods; .*method = .direct.$"):
+        choose_order([reduced(decay("one", 1.0, 0.2, 0.0))], settings)
 
 
 def test_divergence_is_reported_and_not_raised() -> None:

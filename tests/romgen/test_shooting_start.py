@@ -15,7 +15,7 @@ from romgen.learning_notes import learning_notes
 from romgen.linear_reference import LinearReference, linear_reference
 from romgen.normal_form import FitOrigin, fit_normal_form, resonance_table
 from romgen.order_selection import motion_error
-from romgen.shooting_start import band_passed, rates
+from romgen.shooting_start import band_passed, charted, rates, segments
 from romgen.trajectory_fit import fit_on_trajectories, is_long_enough
 from tests.romgen.fmu.models import random_model
 
@@ -62,6 +62,19 @@ def test_starts_that_all_blow_up_are_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(refinement, "FAR", 0.1)
     with pytest.raises(NumericalError, match="blow up"):
         fit_on_trajectories(exchanging(), 3, (1, 2), 1e-8)
+
+
+def test_a_motion_begins_where_samples_count() -> None:
+    """What a fit has not seen before its first sample is not simulated; a motion seen from its start keeps it."""
+    (r, *_) = exchanging()
+    fit = fit_normal_form([r], 3, (1, 2), 1e-8)
+    late = np.arange(len(r.t)) >= 500
+    for n in (1, 4):
+        (first, *_) = segments(charted(fit, [r]), [r], [late], n)
+        assert first.t[0] == r.t[500]
+        assert np.array_equal(first.z0, charted(fit, [r]).signals[0][500])
+        assert first.kept.all()
+        assert segments(charted(fit, [r]), [r], [np.ones(len(r.t), dtype=bool)], n)[0].t[0] == r.t[0]
 
 
 def test_offsets_do_not_shorten_a_motion() -> None:

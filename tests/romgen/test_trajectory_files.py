@@ -60,6 +60,26 @@ def test_hdf5_of_others(tmp_path: Path, flat: bool) -> None:
     assert read.displacement == pytest.approx(X, rel=1e-15)
 
 
+def test_hdf5_with_other_contents(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """What is no motion is named; half a motion is refused."""
+    write_trajectories(tmp_path / "a.h5", [Trajectory("one", T, SENSORS, X)])
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file["temperature"] = 20.0
+    assert [r.name for r in read_trajectories([tmp_path / "a.h5"], SENSORS, "m")] == ["one"]
+    assert "a.h5: temperature is no group with t and x and was not read" in caplog.text
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file["half/t"] = T
+    with pytest.raises(InputError, match=r"a.h5/half: group without t and x; got \['t'\]"):
+        read_trajectories([tmp_path / "a.h5"], SENSORS, "m")
+
+
+@pytest.mark.parametrize("factor", [1e200, 1e-200])
+def test_displacements_that_cannot_be_squared_are_refused(tmp_path: Path, factor: float) -> None:
+    np.savez(tmp_path / "a.npz", t=T, x=factor * X)
+    with pytest.raises(InputError, match=r"too large or too small to compute with; got at most 1e.200 m"):
+        read_trajectories([tmp_path / "a.npz"], SENSORS, "m")
+
+
 def test_npz_without_t(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", offset=1.0, displacement=X)
     with pytest.raises(InputError, match="holds no trajectory; it needs arrays t and x"):
@@ -100,9 +120,7 @@ def test_mat_with_one_motion(tmp_path: Path, hdf5: bool) -> None:
 
 def test_mat_without_t_and_x(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "a.mat", {"time": T, "y": X})
-    with pytest.raises(
-        InputError, match=r"neither a cell array with columns t and x, nor t and x; got \['time', 'y'\]"
-    ):
+    with pytest.raises(InputError, match=r"nor t and x; got \['time: 1 x 11', 'y: 11 x 2'\]; give a cell array"):
         read_trajectories([tmp_path / "a.mat"], SENSORS, "m")
 
 

@@ -66,6 +66,7 @@ def _without(*keys: str) -> Callable[[dict[str, Any]], None]:
 
 
 MISTAKES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
+    (_set("learn", to={"method": "best"}), "[learn] method: Input should be 'auto', 'direct' or 'refined'; got 'best'"),
     (_set("lern", to={}), "unknown key 'lern'; did you mean 'learn'?"),
     (_set("blocks", "bar", "matrial", to="steel"), "[blocks.bar] unknown key 'matrial'; did you mean 'material'?"),
     (_set("ringdowns", "training", 0, "amplitude", to=[1.0]), "[ringdowns.training[0]] unknown key 'amplitude'; did"),
