@@ -203,7 +203,10 @@ def _delay_chart(samples: Sequence[FloatArray], m: int, step: float, filtered: L
             advice=f"at least {recorded_length(needed, filtered)} samples are needed, two periods and the differences",
         )
     X = [windows(x, delays) for x in samples]
-    basis = principal_directions(np.asarray(sum(block.T @ block for block in X)))[:, : 2 * m]
+    gram = np.asarray(sum(block.T @ block for block in X))
+    if np.linalg.matrix_rank(gram, hermitian=True) < 2 * m:
+        raise NumericalError("windows of the sensors hold fewer motions than modes", where="sensor chart", value=m)
+    basis = principal_directions(gram)[:, : 2 * m]
     c = [block @ basis for block in X]
     inner = np.vstack([values[DROPPED : len(values) - DROPPED] for values in c])
     eigenvalues, vectors = linear_modes(inner, np.vstack([first_derivative(values, step) for values in c]))
