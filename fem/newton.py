@@ -11,7 +11,7 @@ are halved while the residual does not fall.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +21,7 @@ from fem.contact import ContactState
 from fem.errors import FemConvergenceError, FemInputError
 from fem.linear_solver import make_solver
 from fem.model import Model
-from fem.rigid_motion import loose_bodies, loose_motion
+from fem.rigid_motion import loose_bodies, loose_drift, loose_motion
 from fem.roundoff import is_rounding
 from fem.tangent_solver import TangentSolver
 
@@ -109,7 +109,14 @@ class LoadStep:
 
         No convergence raises ``FemConvergenceError``; an interface that must hold a body but opens, ``FemInputError``.
         """
-        found = self._newton(u, shortening, (1.0,)) or self._newton(u, shortening, _LENGTHS)
+        try:
+            found = self._newton(u, shortening, (1.0,)) or self._newton(u, shortening, _LENGTHS)
+        except FemInputError:
+            near = self._approached(u, shortening)
+            if near is None:
+                raise
+            self._closing, self.target = 0, replace(self.target, touching=False)
+            found = self._newton(near, shortening, (1.0,)) or self._newton(near, shortening, _LENGTHS)
         if found is not None:
             return found
         limit = self._tolerance
@@ -153,6 +160,27 @@ class LoadStep:
         residual = np.where(model.free, target.load - force - shortening @ bolts.pull, 0.0)
         miss = target.bolts - bolts.pull @ u - bolts.stiffness * shortening
         return Point(u, shortening, state, residual, miss)
+
+    def _approached(self, u: FloatArray, shortening: FloatArray) -> FloatArray | None:
+        """u (n_dof,) with loose parts moved as the load drives them until they touch; None where they meet nothing.
+
+        For parts that drawing together leaves open, such as a pin in a hole: it has gaps all around and bears on one
+        side.
+        """
+        contact, given = self.model.contact, u
+        for _ in range(6 * len(self.model.bodies)):
+            point = self._at(u, shortening)
+            closed = point.contact.status[:, 0] > 0
+            if loose_motion(self.model, closed) is None:
+                break
+            drift = loose_drift(self.model, closed, point.residual)
+            rate = contact.relative(drift[:, None])[::3, 0]
+            meets = np.flatnonzero((rate < -_TOUCH) & ~closed)
+            if not len(meets):
+                return None
+            gap = contact.initial_gap + contact.relative(u[:, None])[::3, 0] + _TOUCH * contact.facet_size
+            u = u + drift * (gap[meets] / -rate[meets]).min()
+        return None if u is given else u
 
     def _must_close(self, point: Point, iteration: int) -> bool:
         """Whether to draw points together: at the first touch, or where open surfaces leave a body loose."""

@@ -86,10 +86,27 @@ def check_closed(model: Model, status: IntArray, who: str) -> None:
 def loose_motion(model: Model, closed: BoolArray, sliding: BoolArray | None = None) -> FloatArray | None:
     """A rigid motion (n_part, 6) that supports, springs, ties and the ``closed`` points (n_point,) let pass, or None.
 
-    Rank of the supported rows and of B R over the rigid motions R; points that have no friction, or are
-    ``sliding`` (n_point,), resist along the normal only.
+    Points that have no friction, or are ``sliding`` (n_point,), resist along the normal only.
     """
+    loose = _loose_space(model, rigid_motions(model), closed, sliding)
+    return loose[-1].reshape(-1, 6) if len(loose) else None
+
+
+def loose_drift(model: Model, closed: BoolArray, force: FloatArray) -> FloatArray:
+    """Rigid displacement (n_dof,) along which ``force`` (n_dof,) N drives loose parts, largest component 1; or 0."""
     motions = rigid_motions(model)
+    loose = _loose_space(model, motions, closed, None)
+    work = motions.T @ force
+    # What is driven by rounding alone, such as a spin about an axis of symmetry, stays where it is.
+    drive = loose.T @ (loose @ work)
+    if np.linalg.norm(drive) <= _TOLERANCE * np.abs(force).sum():
+        return np.zeros(model.n_dof)
+    drift = motions @ drive
+    return np.asarray(drift / np.abs(drift).max())
+
+
+def _loose_space(model: Model, motions: FloatArray, closed: BoolArray, sliding: BoolArray | None) -> FloatArray:
+    """Null space (n_loose, 6 n_part) of the supported rows and of B R over the rigid motions R, least resisted last."""
     contact, bonds = model.contact, model.bonds
     rough = closed & (contact.law[:, 2] > 0.0)
     if sliding is not None:
@@ -100,7 +117,7 @@ def loose_motion(model: Model, closed: BoolArray, sliding: BoolArray | None = No
     # At least as many rows as columns, so that every direction of the null space has its singular value.
     restraint = np.vstack([*parts, np.zeros((motions.shape[1], motions.shape[1]))])
     _, size, directions = np.linalg.svd(restraint, full_matrices=False)
-    return None if size[-1] > _TOLERANCE * size[0] else directions[-1].reshape(-1, 6)
+    return np.asarray(directions[size <= _TOLERANCE * size[0]])
 
 
 def loose_bodies(model: Model, share: FloatArray) -> str:

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fem.block import graded, hex_block
 from fem.contact_report import penalty_reports
 from fem.equilibrium import interface_states
 from fem.errors import FemConvergenceError, FemInputError
 from fem.loads import Force
 from fem.material import Material
+from fem.mesh import Mesh
 from fem.model import Body, Clamp, Model, Pair, Support, build_model
 from fem.newton import internal_force
 from fem.preload import StaticSettings, StaticState, solve_static
@@ -72,6 +74,44 @@ def test_interface_that_never_closes_is_named() -> None:
     model = _blocks(1e-3, pull=True)
     with pytest.raises(FemInputError, match=r"contact joint: the interface never closes; got upper free"):
         solve_static(model, model.load, ONE_STEP)
+
+
+def _ring(radii: tuple[float, float], cells: int) -> Mesh:
+    """A quarter ring about z, 5 mm long, sides of y = 0 and x = 0 by the names y_min and y_max."""
+
+    def bend(points: np.ndarray) -> np.ndarray:
+        r, angle, z = points.T
+        return np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
+
+    lines = (graded(list(radii), [2]), graded([0.0, 0.5 * np.pi], [cells]), graded([0.0, 0.005], [1]))
+    return hex_block(*lines, mapping=bend)
+
+
+@pytest.mark.parametrize(("clearance", "friction"), [(1e-5, 0.0), (2e-4, 0.0), (5e-5, 0.2)])
+def test_pin_in_a_hole_bears_on_one_side(clearance: float, friction: float) -> None:
+    """Gaps all around: drawn together everywhere the pin would open again; the load brings it to one side of the hole.
+
+    Half a model of a pin pushed along y: the hole carries the force, and the pin has moved by the clearance and by
+    what the parts and the joint give.
+    """
+    pin, plate = _ring((0.004, 0.01 - clearance), 10), _ring((0.01, 0.02), 12)
+    model = build_model(
+        [Body("pin", pin, STEEL), Body("plate", plate, STEEL)],
+        pairs=[Pair("hole", "pin.x_max", "plate.x_min", friction)],
+        supports=[
+            Support("plate.x_max", ("x", "y", "z")),
+            Support("plate.y_max", ("x",)),
+            Support("pin.y_max", ("x",)),
+            Support("pin.z_min", ("z",)),
+        ],
+        loads=[Force("push", "pin.x_min", (0.0, 500.0, 0.0))],
+    )
+    state = solve_static(model, model.load, ONE_STEP)
+    hole = interface_states(model, state.u, state.contact)[0]
+    assert hole.force[1] == pytest.approx(500.0, rel=1e-6)
+    assert 0.0 < hole.contact_area < 0.5 * 0.01 * 0.5 * np.pi * 0.005
+    top = int(np.argmax(pin.points[:, 1]))
+    assert clearance < state.u[3 * top + 1] < clearance + 6e-6
 
 
 def test_step_that_fails_is_cut() -> None:
