@@ -7,6 +7,7 @@ cut runs along faces of cells, flat or not (pretension sections of ANSYS and Aba
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ import numpy as np
 
 from fem.arrays import BoolArray, FloatArray, IntArray
 from fem.body import Body
+from fem.bounds import real
 from fem.contact import Contact
 from fem.errors import FemInputError
 from fem.finite_values import finite_vector
@@ -54,7 +56,7 @@ class Bolt:
 
     def __post_init__(self) -> None:
         where = f"bolt {self.name}"
-        if not (np.isfinite(self.force) and self.force > 0.0):
+        if not 0.0 < real(self.force) < math.inf:
             raise FemInputError("the bolt force must be positive", where=where, value=self.force)
         if isinstance(self.axis, str) and self.axis not in AXES:
             advice = "choose x, y, z or a direction (x, y, z)"

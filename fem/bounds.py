@@ -8,6 +8,14 @@ from numbers import Integral, Real
 from fem.errors import FemInputError
 
 
+def real(value: object) -> float:
+    """The number that a setting is, or nan, which lies within no bounds: text and tables are none."""
+    try:
+        return math.nan if isinstance(value, str) else float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return math.nan
+
+
 def require(where: str, name: str, value: object, least: float, *, above: bool = False, most: float = math.inf) -> None:
     """Refuse a setting that is not finite, below ``least`` (or at it, where it must be ``above``) or over ``most``."""
     number = float(value) if isinstance(value, Real) else math.nan

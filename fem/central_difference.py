@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem.arrays import FloatArray
-from fem.bounds import require_count
+from fem.bounds import real, require_count
 from fem.contact import ContactState
 from fem.critical_step import critical_step
 from fem.dynamics import Dynamics
@@ -48,11 +48,11 @@ class ExplicitSettings:
     solver: str = "auto"
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.time_step < math.inf:
+        if not 0.0 < real(self.time_step) < math.inf:
             raise FemInputError(
                 "time step must be positive and finite", where="explicit transient", value=self.time_step
             )
-        if not 0.0 < self.safety <= 1.0:
+        if not 0.0 < real(self.safety) <= 1.0:
             raise FemInputError("safety must lie in (0, 1]", where="explicit transient", value=self.safety)
 
 

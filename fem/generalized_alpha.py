@@ -50,7 +50,7 @@ class Scheme:
         inertia 1 + r = (omega / x)^2 does it. Needs omega h <= 1.
         """
         if omega * step > 1.0:
-            advice = "use a smaller time step or correct fewer modes"
+            advice = "use a smaller time step, or settings with dispersion_correction=False or fewer corrected_modes"
             raise FemInputError(
                 "time step too large for the mode", where="transient", value=omega * step, advice=advice
             )

@@ -41,8 +41,8 @@ class History:
     friction, damping, external : (n_time, n_case) J, work since the first state; external that of loads and supports.
     force : (n_time, n_pair, 3, n_case) N, resultant of the tractions of every pair on its master.
     reaction : (n_time, n_support, 3, n_case) N, resultant of every support of the model, the static part included; what
-        two supports hold counts for the first of them. It balances loads and inertia: exactly for central differences,
-        to O(h^2) for generalised-alpha.
+        two supports hold counts for the first of them. With loads it balances M u'' + alpha M u': exactly for central
+        differences, to O(h^2) for generalised-alpha.
     spring : (n_time, n_spring, 3, n_case) N, force of every spring and foundation, its damping beta k u' included.
     closed, slipping : (n_time, n_pair, n_case) m^2, area in contact and the part of it that slips.
     state : to march on from.

@@ -18,8 +18,9 @@ from fem.errors import FemInputError
 from fem.pairing import mean_size
 from fem.reach import TieWarning
 
-BONDED = 0.9
-"""Share of the smaller surface of a tie below which it may hold less than was meant."""
+MISSED, LITTLE = 0.1, 1.0 / 3.0
+"""A tie may hold less than was meant where more than MISSED of its smaller surface faces the other one out of reach, or
+less than LITTLE finds a partner. Lap joints tie halves of faces, washers faces over holes."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,8 @@ class Tie:
     The bond is elastic, tau = k (u_s - u_m) in all directions and in tension too, so that it adds to the stiffness and
     no constraint enters a solver. k = ``stiffness`` E / h unless ``penalty`` (Pa/m) is given: at the default of 100 the
     bond is as compliant as a hundredth of a facet size of material. A distance between the surfaces is kept.
-    ``reach`` in m is the largest one, by default half the mean slave facet size; ``TieWarning`` says where less than
-    ``BONDED`` of the smaller surface finds a partner.
+    ``reach`` in m is the largest one, by default half the mean slave facet size; ``TieWarning`` says where more than
+    a tenth of the smaller surface faces the other one farther away, or less than a third finds a partner.
     """
 
     name: str
@@ -101,11 +102,13 @@ def tie_bond(bodies: Sequence[Body], offsets: IntArray, points: FloatArray, tie:
 
 
 def _check_bonded(tie: Tie, bond: Contact) -> None:
-    """Warn of a tie that holds less of both surfaces than ``BONDED``."""
+    """Warn of a tie that holds little of both surfaces, or leaves much of what faces each other out of reach."""
     area, (slave, master) = float(bond.area.sum()), bond.surface[0]
-    if area >= BONDED * min(slave, master):
+    smaller = min(slave, master)
+    missed = float(bond.left_out.area[bond.left_out.gap > 0.0].sum())
+    if area >= LITTLE * smaller and min(missed, smaller - area) <= MISSED * smaller:
         return
-    beyond = float(bond.left_out.area[bond.left_out.gap > 0.0].sum()) / slave
+    beyond = missed / slave
     far = f"{100.0 * beyond:.3g} % of the slave faces it farther than the reach of {bond.left_out.reach[0]:.3g} m"
     warnings.warn(
         f"tie {tie.name}: only {100.0 * area / slave:.3g} % of the slave {tie.slave} ({100.0 * area / master:.3g} % of "

@@ -12,6 +12,7 @@ from fem.body import Body
 from fem.element import ReferenceElement, reference_element
 from fem.errors import FemInputError
 from fem.finite_values import finite_vector
+from fem.names import nearest
 
 _NEIGHBOURS = 27
 _OUTSIDE = 0.02
@@ -37,8 +38,7 @@ def cell_of_point(
     place = finite_vector(point, "the point", where=where)
     names = [part.name for part in bodies]
     if body is not None and body not in names:
-        advice = f"bodies are {', '.join(names)}"
-        raise FemInputError("unknown body", where=where, value=body, advice=advice)
+        raise FemInputError("unknown body", where=where, value=body, advice=nearest(body, names, "bodies are"))
     asked = [number for number, name in enumerate(names) if body in (None, name)]
     found = {number: _closest(bodies[number], place) for number in asked}
     on = [number for number in asked if found[number][0] <= _OUTSIDE]
@@ -47,12 +47,12 @@ def cell_of_point(
         raise FemInputError("the point lies on several bodies", where=where, value=tuple(point), advice=advice)
     if not on:
         points = np.vstack([bodies[number].mesh.points for number in asked])
-        nearest = points[np.linalg.norm(points - place, axis=1).argmin()]
+        closest = points[np.linalg.norm(points - place, axis=1).argmin()]
         raise FemInputError(
             f"the point lies outside {'all bodies' if body is None else body}",
             where=where,
             value=tuple(point),
-            advice=f"the nearest node is at {tuple(float(x) for x in nearest.round(6))}",
+            advice=f"the nearest node is at {tuple(float(x) for x in closest.round(6))}",
         )
     _, nodes, shape = found[on[0]]
     return CellPoint(nodes + int(offsets[on[0]]), shape)

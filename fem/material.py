@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fem.bounds import real
 from fem.errors import FemInputError
 
 
@@ -24,13 +25,13 @@ class Material:
     density: float
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.young_modulus < math.inf:
+        if not 0.0 < real(self.young_modulus) < math.inf:
             raise FemInputError(
                 "Young's modulus must be positive and finite", where="material", value=self.young_modulus
             )
-        if not -1.0 < self.poisson_ratio < 0.5:
+        if not -1.0 < real(self.poisson_ratio) < 0.5:
             raise FemInputError("Poisson's ratio must lie in (-1, 0.5)", where="material", value=self.poisson_ratio)
-        if not 0.0 < self.density < math.inf:
+        if not 0.0 < real(self.density) < math.inf:
             raise FemInputError("density must be positive and finite", where="material", value=self.density)
 
     @property

@@ -72,6 +72,10 @@ class Target:
     touching: bool
 
 
+class _NeverClosesError(FemInputError):
+    """Surfaces that must hold a part stay open when they are drawn together."""
+
+
 @dataclass(frozen=True)
 class Point:
     """One iterate: u (n_dof,), delta (n_bolt,), contact, residuals of the nodes (n_dof,) and bolts (n_bolt,) in N."""
@@ -111,7 +115,7 @@ class LoadStep:
         """
         try:
             found = self._newton(u, shortening, (1.0,)) or self._newton(u, shortening, _LENGTHS)
-        except FemInputError:
+        except _NeverClosesError:
             near = self._approached(u, shortening)
             if near is None:
                 raise
@@ -201,7 +205,7 @@ class LoadStep:
             advice = "check the direction of the loads, the initial gaps and that the surfaces meet"
             where = f"contact {', '.join(open_pairs)}"
             value = f"{loose_bodies(self.model, share)} free"
-            raise FemInputError("the interface never closes", where=where, value=value, advice=advice)
+            raise _NeverClosesError("the interface never closes", where=where, value=value, advice=advice)
         return True
 
     def _iterate(self, point: Point, lengths: tuple[float, ...], *, driving: bool, closing: bool) -> Point:

@@ -191,10 +191,11 @@ def point_mass_matrix(masses: Sequence[PointMass], assembly: Assembly) -> sp.csr
     total = sp.csr_matrix((n_dof, n_dof))
     for item in masses:
         where = f"point mass {item.name}"
-        if not finite_number(item.mass, "the mass", where=where) > 0.0:
+        mass = finite_number(item.mass, "the mass", where=where)
+        if not mass > 0.0:
             raise FemInputError("mass must be positive", where=where, value=item.mass)
         rows = _point_rows((item.point, item.body), assembly, where)
-        total = total + item.mass * (rows.T @ rows)
+        total = total + mass * (rows.T @ rows)
     return total.tocsr()
 
 
@@ -204,5 +205,5 @@ def lumped_point_masses(masses: Sequence[PointMass], assembly: Assembly) -> Floa
     for item in masses:
         where = f"point mass {item.name}"
         found = cell_of_point(assembly.bodies, assembly.offsets, item.point, where=where, body=item.body)
-        nodal[found.nodes] += item.mass * found.shape**2 / (found.shape @ found.shape)
+        nodal[found.nodes] += float(item.mass) * found.shape**2 / (found.shape @ found.shape)
     return nodal

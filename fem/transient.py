@@ -15,7 +15,7 @@ import numpy as np
 
 from fem.anderson import Anderson
 from fem.arrays import FloatArray
-from fem.bounds import require, require_count
+from fem.bounds import real, require, require_count
 from fem.corrector import Corrector
 from fem.dynamics import Dynamics
 from fem.errors import FemConvergenceError, FemInputError
@@ -79,7 +79,7 @@ class TransientSettings:
     max_doublings: int = 0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.time_step < math.inf:
+        if not 0.0 < real(self.time_step) < math.inf:
             raise FemInputError("time step must be positive and finite", where="transient", value=self.time_step)
         for name in ("depth", "max_iterations"):
             require_count("transient", name, getattr(self, name), 1)
@@ -90,7 +90,7 @@ class TransientSettings:
         if self.method not in METHODS:
             advice = f"choose one of {', '.join(METHODS)}"
             raise FemInputError("unknown method", where="transient", value=self.method, advice=advice)
-        if self.error_tolerance is not None and not 0.0 < self.error_tolerance < math.inf:
+        if self.error_tolerance is not None and not 0.0 < real(self.error_tolerance) < math.inf:
             raise FemInputError("error tolerance must be positive", where="transient", value=self.error_tolerance)
 
 
