@@ -168,7 +168,7 @@ def test_a_named_body_takes_the_point(tmp_path: Path, tables: dict[str, Any]) ->
 def test_ties_that_bond_little_are_logged_once(
     tmp_path: Path, tables: dict[str, Any], caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The strip of 100 mm hangs over its base of 20 mm, which it covers: no word. Moved off all but a quarter: one line."""
+    """A strip of 100 mm covers its base of 20 mm: no word. Moved off all but a quarter: one line."""
     tables["ties"] = {"pad": {"slave": "strip.low", "master": "base.y_max"}}
     fe_stages.solve_preload(_study(tmp_path, tables), lambda share, text: None)
     assert "bonded" not in caplog.text
